@@ -1,0 +1,44 @@
+"""How a computation ended: a named value with advice, never a bare flag."""
+
+from enum import StrEnum
+
+
+class Outcome(StrEnum):
+    """The end of a solve or of a run. The value is the name users see; `advice` says what to do next."""
+
+    CONVERGED = "converged"
+    STATIONARY = "stationary"
+    REACHED_END = "reached-end"
+    NECK_CLOSED = "neck-closed"
+    MAX_ITERATIONS = "max-iterations"
+    DIVERGED = "diverged"
+    SINGULAR = "singular"
+    NOT_FINITE = "not-finite"
+    STEP_UNDERFLOW = "step-underflow"
+    MAX_STEPS = "max-steps"
+
+    @property
+    def is_success(self) -> bool:
+        """True where the result is what was asked for, False where the solver gave up."""
+        return self in _SUCCESS
+
+    @property
+    def advice(self) -> str:
+        """One sentence: what happened and what to try."""
+        return _ADVICE[self]
+
+
+_SUCCESS = {Outcome.CONVERGED, Outcome.STATIONARY, Outcome.REACHED_END, Outcome.NECK_CLOSED}
+
+_ADVICE = {
+    Outcome.CONVERGED: "The equations hold to the tolerance.",
+    Outcome.STATIONARY: "Shape, flow and concentrations no longer change.",
+    Outcome.REACHED_END: "The end time was reached; raise `until` or resume to go on.",
+    Outcome.NECK_CLOSED: "The neck became thinner than the closing radius: beyond it the surface would split.",
+    Outcome.MAX_ITERATIONS: "Newton ran out of iterations: start from a nearer state or take a smaller step.",
+    Outcome.DIVERGED: "Newton could not reduce the residual: start from a nearer state or take a smaller step.",
+    Outcome.SINGULAR: "The linear system is singular: an unknown is left free or a condition is repeated.",
+    Outcome.NOT_FINITE: "A NaN or infinity appeared: check the start and the parameters.",
+    Outcome.STEP_UNDERFLOW: "The time step fell below its minimum: raise `elements`, loosen `time_tolerance`, or check the parameters.",
+    Outcome.MAX_STEPS: "The step limit was reached: raise `max_steps` or resume.",
+}

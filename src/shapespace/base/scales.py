@@ -1,0 +1,215 @@
+"""Quantities, their dimensions, and the scales that turn the user's numbers into the solver's dimensionless ones.
+
+The solver only ever sees numbers in units of four scales (c0 = reference_concentration),
+
+                   length               energy                     time                               concentration
+    closed surface R0 = sphere_radius   kappa = bending_rigidity   tau = bulk_viscosity R0^2/kappa    c0
+    open membrane  R_b = base_radius    kappa = bending_rigidity   tau = shear_viscosity R_b^2/kappa  none
+
+so two statements of one experiment in different units are the same computation, to round-off.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import NamedTuple, Self, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapespace.base.errors import InputError
+
+Value = TypeVar("Value", float, NDArray[np.float64])
+
+
+class Dimension(NamedTuple):
+    """Exponents of length, energy, time and concentration."""
+
+    length: int = 0
+    energy: int = 0
+    time: int = 0
+    concentration: int = 0
+
+
+class Quantity(NamedTuple):
+    """One name of the public interface: its symbol in formulas, its meaning, its dimension."""
+
+    symbol: str
+    meaning: str
+    dimension: Dimension
+
+
+_NUMBER = Dimension()
+_LENGTH = Dimension(1)
+_AREA = Dimension(2)
+_CURVATURE = Dimension(-1)
+_ENERGY = Dimension(energy=1)
+_TIME = Dimension(time=1)
+_RATE = Dimension(time=-1)
+_TENSION = Dimension(-2, 1)
+_VISCOSITY = Dimension(-2, 1, 1)
+_FORCE = Dimension(-1, 1)
+_POWER = Dimension(0, 1, -1)
+_VELOCITY = Dimension(1, 0, -1)
+_CONCENTRATION = Dimension(concentration=1)
+
+QUANTITIES: dict[str, Quantity] = {
+    # keys of scenarios
+    "bending_rigidity": Quantity("kappa", "bending rigidity", _ENERGY),
+    "spontaneous_curvature": Quantity("C0", "spontaneous curvature", _CURVATURE),
+    "shear_viscosity": Quantity("eta_s", "surface shear viscosity", _VISCOSITY),
+    "bulk_viscosity": Quantity("eta_b", "surface bulk viscosity", _VISCOSITY),
+    "friction": Quantity("Gamma", "tangential friction with the surroundings", Dimension(-4, 1, 1)),
+    "tension": Quantity("gamma", "passive isotropic tension", _TENSION),
+    "boundary_tension": Quantity("gamma0", "tension of the reservoir at the rim", _TENSION),
+    "active_tension": Quantity("(xi Delta_mu)_0", "active tension at saturation", _TENSION),
+    "peclet": Quantity("Pe", "Peclet number (xi Delta_mu)_0 R0^2 / (D eta_b)", _NUMBER),
+    "inverse_hydrodynamic_length": Quantity(
+        "R0/L_h", "ratio of R0 to the hydrodynamic length sqrt(eta_b/Gamma)", _NUMBER
+    ),
+    "diffusivity": Quantity("D", "diffusivity of the stress regulator", Dimension(2, 0, -1)),
+    "turnover_rate": Quantity("k", "turnover rate of the stress regulator", _RATE),
+    "reference_concentration": Quantity("c0", "reference concentration", _CONCENTRATION),
+    "saturation_concentration": Quantity("c_s", "concentration at half saturation", _CONCENTRATION),
+    "ring_amplitude": Quantity("Delta_c", "relative amplitude of the preferred ring", _NUMBER),
+    "ring_width": Quantity("w", "width of the ring in u", _NUMBER),
+    "sphere_radius": Quantity("R0", "radius of the sphere of the enclosed volume", _LENGTH),
+    "enclosed_volume": Quantity("V0", "enclosed volume", Dimension(3)),
+    "base_radius": Quantity("R_b", "radius of the clamped rim", _LENGTH),
+    "coat_area": Quantity("A_p", "area of the coat per 2 pi", _AREA),
+    "coat_sharpness": Quantity("sigma_p", "sharpness of the coat's edge per 2 pi", Dimension(-2)),
+    "pulled_area": Quantity("A_f", "area of the pulled patch per 2 pi", _AREA),
+    "pulled_sharpness": Quantity("sigma_f", "sharpness of the pulled patch's edge per 2 pi", Dimension(-2)),
+    "initial_background": Quantity("c_b", "initial uniform concentration over c0", _NUMBER),
+    "initial_ring_amplitude": Quantity("c_r", "initial ring concentration over c0", _NUMBER),
+    "seed_amplitude": Quantity("epsilon", "relative antisymmetric perturbation of the initial concentration", _NUMBER),
+    "until": Quantity("t_end", "end time", _TIME),
+    "dt": Quantity("Delta_t", "fixed time step, 0 for adaptive steps", _TIME),
+    "time_tolerance": Quantity("tol_t", "relative local error of one adaptive step", _NUMBER),
+    "stationary_rate": Quantity("rate", "largest relative rate of change per tau that counts as stationary", _NUMBER),
+    "max_steps": Quantity("n_max", "largest number of time steps", _NUMBER),
+    "elements": Quantity("N", "number of collocation elements", _NUMBER),
+    "degree": Quantity("k_G", "Gauss points per element", _NUMBER),
+    "mesh_tolerance": Quantity("tol_u", "relative discretisation error aimed at", _NUMBER),
+    "azimuthal_flow": Quantity("v_phi", "switch that makes the azimuthal flow an unknown", _NUMBER),
+    # observables
+    "time": Quantity("t", "time", _TIME),
+    "height": Quantity("d", "height z(0) - z(1)", _LENGTH),
+    "neck_radius": Quantity("r_n", "neck radius", _LENGTH),
+    "equator_radius": Quantity("r(1/2)", "radius at u = 1/2", _LENGTH),
+    "length": Quantity("L", "length of the generating curve", _LENGTH),
+    "area": Quantity("A", "area", _AREA),
+    "volume": Quantity("V", "enclosed volume", Dimension(3)),
+    "pressure": Quantity("p", "pressure difference, inside minus outside", Dimension(-3, 1)),
+    "tension_pole": Quantity("T(0)", "isotropic tension at u = 0", _TENSION),
+    "velocity": Quantity("v0", "axial swimming speed", _VELOCITY),
+    "polarity": Quantity("P", "shape polarity 1 - H(0)/H(1)", _NUMBER),
+    "max_concentration": Quantity("max c", "largest concentration", _CONCENTRATION),
+    "ring_position": Quantity("u_m", "mesh coordinate of the largest concentration", _NUMBER),
+    "pulling_force": Quantity("F_pull", "true pulling force", _FORCE),
+    "pulling_force_per_2pi": Quantity("F_pull/2pi", "pulling force over 2 pi", _FORCE),
+    "bending_energy": Quantity("F_kappa", "bending energy", _ENERGY),
+    "energy": Quantity("F", "free energy: bending plus passive tension", _ENERGY),
+    "external_power": Quantity("P_ext", "power of external forces and of the reservoir", _POWER),
+    "dissipation": Quantity("2 D", "mechanical dissipation rate", _POWER),
+    "chemical_power": Quantity("P_chem", "power of the active tension", _POWER),
+    "energy_residual": Quantity("R_E", "rest of the energy law", _POWER),
+    "max_meridional_curvature": Quantity("max |C_u^u|", "largest meridional curvature", _CURVATURE),
+    "reduced_volume": Quantity("v", "reduced volume", _NUMBER),
+    # fields along the curve
+    "mesh_coordinate": Quantity("u", "mesh coordinate", _NUMBER),
+    "radius": Quantity("r", "distance from the axis", _LENGTH),
+    "axial_position": Quantity("z", "position along the axis in the lab frame", _LENGTH),
+    "tangent_angle": Quantity("psi", "tangent angle", _NUMBER),
+    "meridional_curvature": Quantity("C_u^u", "meridional curvature", _CURVATURE),
+    "azimuthal_curvature": Quantity("C_phi^phi", "azimuthal curvature", _CURVATURE),
+    "tangential_velocity": Quantity("v_u", "tangential velocity in the lab frame", _VELOCITY),
+    "normal_velocity": Quantity("v_n", "normal velocity in the lab frame", _VELOCITY),
+    "concentration": Quantity("c", "concentration of the stress regulator", _CONCENTRATION),
+    "local_spontaneous_curvature": Quantity("C0(u)", "local spontaneous curvature", _CURVATURE),
+    "local_tension": Quantity("gamma_H", "local tension", _TENSION),
+}
+
+
+@dataclass(frozen=True)
+class Scales:
+    """The four scales of one scenario, in the user's units. All finite and > 0.
+
+    A unit string names a scale where it is the unit (its value is 1: `R0/tau`) and otherwise says in words that the
+    number is in the units in which the scenario was written (`length/time`).
+    """
+
+    length: float
+    energy: float
+    time: float
+    concentration: float = 1.0
+    length_symbol: str = "R0"
+
+    def __post_init__(self) -> None:
+        for name in Dimension._fields:
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(
+                    f"{name} scale = {value:g}: must be finite and > 0; choose units in which the parameters "
+                    "are neither huge nor tiny."
+                )
+
+    @classmethod
+    def of(cls, parameters: Mapping[str, float]) -> Self:
+        """The scales of a set of parameters, of the open membrane where it has a `base_radius`."""
+        is_open = "base_radius" in parameters
+        length = parameters["base_radius" if is_open else "sphere_radius"]
+        viscosity = parameters["shear_viscosity" if is_open else "bulk_viscosity"]
+        energy = parameters["bending_rigidity"]
+        return cls(
+            length=length,
+            energy=energy,
+            time=viscosity * length / energy * length,
+            concentration=1.0 if is_open else parameters["reference_concentration"],
+            length_symbol="R_b" if is_open else "R0",
+        )
+
+    def factor(self, name: str) -> float:
+        """The unit of a quantity: its value in the user's units is this times its dimensionless value."""
+        dimension = QUANTITIES[name].dimension
+        try:
+            factor = math.prod(getattr(self, base) ** exponent for base, exponent in dimension._asdict().items())
+        except (OverflowError, ZeroDivisionError):
+            factor = math.inf
+        if not (math.isfinite(factor) and factor > 0):
+            raise InputError(
+                f"{name}: its unit {self._symbols(dimension, words=True)} over- or underflows; choose units in which "
+                "the parameters are neither huge nor tiny."
+            )
+        return factor
+
+    def to_dimensionless(self, parameters: Mapping[str, float]) -> dict[str, float]:
+        """Dimensionless values of any named quantities, times and steps included."""
+        values = {name: value / self.factor(name) for name, value in parameters.items()}
+        for name, value in values.items():
+            if not math.isfinite(value):
+                raise InputError(
+                    f"{name} = {parameters[name]:g}: is {value} in units of the scales; choose other units."
+                )
+        return values
+
+    def from_dimensionless(self, name: str, value: Value) -> Value:
+        """A dimensionless number or array in the user's units."""
+        return value * self.factor(name)
+
+    def unit(self, name: str) -> str:
+        """The unit of a quantity as text: `R0/tau`, `kappa/R0^2`, `rad`, `1`."""
+        return "rad" if name == "tangent_angle" else self._symbols(QUANTITIES[name].dimension)
+
+    def _symbols(self, dimension: Dimension, *, words: bool = False) -> str:
+        symbols = {"length": self.length_symbol, "energy": "kappa", "time": "tau", "concentration": "c0"}
+        above: list[str] = []
+        below: list[str] = []
+        for base in ("energy", "length", "time", "concentration"):
+            exponent = getattr(dimension, base)
+            symbol = base if words or getattr(self, base) != 1.0 else symbols[base]
+            power = symbol if abs(exponent) == 1 else f"{symbol}^{abs(exponent)}"
+            if exponent:
+                (above if exponent > 0 else below).append(power)
+        text = " ".join(above) or "1"
+        return f"{text}/{' '.join(below) if len(below) == 1 else '(' + ' '.join(below) + ')'}" if below else text

@@ -1,0 +1,1 @@
+"""Models: which terms, species, ends and constraints. Choices only, no algebra."""

@@ -1,0 +1,1 @@
+"""Collocation, meshes, structured linear algebra and Newton's method. Knows no surface."""

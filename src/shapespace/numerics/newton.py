@@ -1,0 +1,105 @@
+"""Damped Newton with an affine-invariant acceptance test, reusing the Jacobian while it contracts well."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapespace.base.arrays import Array
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
+
+
+@dataclass(frozen=True)
+class Newton:
+    """Options. tolerance: accepted size of the next correction, in the problem's norm; the error left is far smaller."""
+
+    tolerance: float = 1e-8
+    max_iterations: int = 25
+    min_damping: float = 1e-4
+    reuse_contraction: float = 0.1
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.tolerance < 1.0:
+            raise ValueError(f"tolerance must lie in (0, 1); got {self.tolerance}.")
+        if not 0.0 < self.min_damping <= 1.0:
+            raise ValueError(f"min_damping must lie in (0, 1]; got {self.min_damping}.")
+
+
+@dataclass(frozen=True)
+class Root:
+    """The end of a Newton iteration. correction: size of the last correction; jacobians, iterations: work done."""
+
+    x: Array
+    outcome: Outcome
+    iterations: int
+    jacobians: int
+    correction: float
+    linearisation: AbstractLinearisation | None
+
+
+def solve_root(
+    problem: AbstractProblem,
+    x: Array,
+    p: Array,
+    rate: Rate,
+    newton: Newton,
+    linearisation: AbstractLinearisation | None = None,
+) -> Root:
+    """Solve F(x, dq/dt; p) = 0 from the guess x.
+
+    A full or damped step is accepted where the simplified correction of the trial point has shrunk by 1 - damping/4
+    (natural monotonicity test, Deuflhard 2011, Sec. 3.3): the test does not depend on how equations are scaled. While
+    corrections shrink by `reuse_contraction` the Jacobian is kept. `linearisation`: factors from a nearby state to try first.
+    """
+    jacobians = 0
+    if linearisation is None:
+        residual, linearisation = problem.linearise(x, p, rate)
+        jacobians = 1
+    else:
+        residual = problem.residual(x, p, rate)
+    fresh = jacobians == 1
+    for iteration in range(1, newton.max_iterations + 1):
+        if not np.isfinite(residual).all():
+            return Root(x, Outcome.NOT_FINITE, iteration, jacobians, np.inf, None)
+        if linearisation.is_singular:
+            return Root(x, Outcome.SINGULAR, iteration, jacobians, np.inf, None)
+        step = -linearisation.solve(residual)
+        size = problem.norm(step, x)
+        trial = _damped_step(problem, linearisation, x, p, rate, step, size, newton)
+        if trial is None and fresh:
+            return Root(x, Outcome.DIVERGED, iteration, jacobians, size, None)
+        if trial is not None:
+            x, residual, correction, correction_size, damping = trial
+            if correction_size <= newton.tolerance and damping == 1.0:
+                outcome = Outcome.CONVERGED
+                return Root(x + correction, outcome, iteration, jacobians, correction_size, linearisation)
+            if correction_size <= newton.reuse_contraction * size and damping == 1.0:
+                fresh = False
+                continue
+        residual, linearisation = problem.linearise(x, p, rate)
+        jacobians, fresh = jacobians + 1, True
+    return Root(x, Outcome.MAX_ITERATIONS, newton.max_iterations, jacobians, size, None)
+
+
+def _damped_step(
+    problem: AbstractProblem,
+    linearisation: AbstractLinearisation,
+    x: Array,
+    p: Array,
+    rate: Rate,
+    step: Array,
+    size: float,
+    newton: Newton,
+) -> tuple[Array, Array, Array, float, float] | None:
+    """The first point x + damping step that passes the natural monotonicity test, halving the damping; None if none does."""
+    damping = 1.0
+    while damping >= newton.min_damping:
+        trial = x + damping * step
+        residual = problem.residual(trial, p, rate)
+        if np.isfinite(residual).all():
+            correction = -linearisation.solve(residual)
+            correction_size = problem.norm(correction, trial)
+            if correction_size <= max((1.0 - 0.25 * damping) * size, newton.tolerance):
+                return trial, residual, correction, correction_size, damping
+        damping *= 0.5
+    return None

@@ -1,0 +1,79 @@
+"""A collocation solution as a value: mesh, coefficients, evaluation anywhere, transfer between meshes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapespace.base.arrays import Array
+from shapespace.numerics.gauss import GaussRule, gauss_rule
+
+
+@dataclass(frozen=True)
+class State:
+    """Piecewise polynomials on `mesh` (N + 1,). nodes (N + 1, n), slopes (N, k, n), algebraic (N, k, n_a), scalars (n_s,)."""
+
+    mesh: Array
+    nodes: Array
+    slopes: Array
+    algebraic: Array
+    scalars: Array
+
+    @property
+    def rule(self) -> GaussRule:
+        """The Gauss rule of the elements."""
+        return gauss_rule(self.slopes.shape[1])
+
+    @property
+    def widths(self) -> Array:
+        """Element widths (N,)."""
+        return np.diff(self.mesh)
+
+    @property
+    def stage_points(self) -> Array:
+        """u at the Gauss points, (N, k)."""
+        return self.mesh[:-1, None] + self.widths[:, None] * self.rule.points
+
+    def stage_values(self) -> Array:
+        """Differential fields at the Gauss points, (N, k, n)."""
+        increments = np.einsum("jl,eln->ejn", self.rule.matrix, self.slopes)
+        return np.asarray(self.nodes[:-1, None] + self.widths[:, None, None] * increments)
+
+    def _locate(self, u: Array) -> tuple[Array, Array]:
+        element = np.clip(np.searchsorted(self.mesh, u, side="right") - 1, 0, len(self.mesh) - 2)
+        return element, (u - self.mesh[element]) / self.widths[element]
+
+    def values(self, u: Array) -> Array:
+        """Differential fields at u (m,), shape (m, n); error of order k + 1, 2k at element ends."""
+        element, x = self._locate(u)
+        weights = self.rule.basis_integral(x) * self.widths[element][:, None]
+        return np.asarray(self.nodes[element] + np.einsum("ml,mln->mn", weights, self.slopes[element]))
+
+    def derivatives(self, u: Array) -> Array:
+        """d/du of the differential fields at u (m,), shape (m, n); error of order k."""
+        element, x = self._locate(u)
+        return np.asarray(np.einsum("ml,mln->mn", self.rule.basis(x), self.slopes[element]))
+
+    def algebraic_values(self, u: Array) -> Array:
+        """Algebraic fields at u (m,), shape (m, n_a); error of order k."""
+        element, x = self._locate(u)
+        return np.asarray(np.einsum("ml,mln->mn", self.rule.basis(x), self.algebraic[element]))
+
+    def on_mesh(self, mesh: Array) -> "State":
+        """The same functions represented on another mesh: exact slopes of the old polynomials at the new Gauss points."""
+        if mesh.shape == self.mesh.shape and np.array_equal(mesh, self.mesh):
+            return self
+        widths, k = np.diff(mesh), self.rule.degree
+        points = (mesh[:-1, None] + widths[:, None] * self.rule.points).ravel()
+        slopes = self.derivatives(points).reshape(len(widths), k, -1)
+        nodes = self.values(mesh)
+        # Slopes sampled from a kinked polynomial miss the increment a little; shift them so that elements stay continuous.
+        missing = np.diff(nodes, axis=0) / widths[:, None] - np.einsum("l,eln->en", self.rule.weights, slopes)
+        algebraic = self.algebraic_values(points).reshape(len(widths), k, -1)
+        return State(mesh, nodes, slopes + missing[:, None], algebraic, self.scalars.copy())
+
+
+def state_from_functions(mesh: Array, degree: int, values: Array, slopes: Array, algebraic: Array, scalars: Array) -> State:
+    """A state from nodal values (N + 1, n), slopes (N, k, n) and algebraic fields (N, k, n_a); continuity is restored."""
+    rule, widths = gauss_rule(degree), np.diff(mesh)
+    missing = np.diff(values, axis=0) / widths[:, None] - np.einsum("l,eln->en", rule.weights, slopes)
+    return State(mesh, values, slopes + missing[:, None], algebraic, scalars)

@@ -1,0 +1,62 @@
+"""What a term of the Rayleigh functional is, and what it may look at.
+
+Densities are per du and per 2 pi, that is, they include the area element r h (paper Eq. rayldens).
+"""
+
+from abc import abstractmethod
+from enum import StrEnum
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+
+from shapespace.base.arrays import Traced
+from shapespace.geometry.curve import Geometry, area_element
+from shapespace.geometry.motion import Rates, coordinate_flow
+
+
+class Site(NamedTuple):
+    """Everything known at one point of the surface: shape, rates w, their gradients w' = dw/du, concentration."""
+
+    geometry: Geometry
+    rates: Rates
+    gradients: Rates
+    concentration: Traced
+
+
+class Ledger(StrEnum):
+    """Where a power is booked in the energy law dF/dt + 2 D = external + chemical (exact result 5)."""
+
+    ENERGY = "energy"
+    DISSIPATION = "dissipation"
+    EXTERNAL = "external"
+    CHEMICAL = "chemical"
+    CONSTRAINT = "constraint"
+
+
+class AbstractTerm(eqx.Module):
+    """One contribution to the Rayleigh functional. `ledger` is a class attribute of each final term."""
+
+    ledger: eqx.AbstractClassVar[Ledger]
+
+    @abstractmethod
+    def power(self, site: Site) -> Traced:
+        """Power density times r h [energy/time]: linear in the rates, or quadratic (half the dissipation) if dissipative."""
+
+
+class AbstractEnergy(AbstractTerm):
+    """A free energy: final classes give its density; `energy_power` is its rate of change along any motion."""
+
+    @abstractmethod
+    def density(self, geometry: Geometry) -> Traced:
+        """Energy per area [energy/length^2]."""
+
+
+def energy_power(energy: AbstractEnergy, site: Site) -> Traced:
+    """d/dt at fixed u of (f r h), a directional derivative along the rates (Eqs. dtFequi, dtfk).
+
+    The cumulative area of an incompressible surface is a material label, so at fixed u it changes by -h q^u r.
+    """
+    g, w = site.geometry, site.rates
+    direction = Geometry(w.r, w.psi, site.gradients.psi, w.h, -coordinate_flow(g, w) * g.r)
+    return jax.jvp(lambda x: energy.density(x) * area_element(x), (g,), (direction,))[1]

@@ -1,0 +1,108 @@
+"""A run as a self-describing xarray Dataset: fields along the curve and observables over time, in the scenario's units."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from shapespace.base.arrays import Array
+from shapespace.base.outcome import Outcome
+from shapespace.base.scales import QUANTITIES
+from shapespace.models.open_membrane import local_spontaneous_curvature
+from shapespace.numerics.state import State
+from shapespace.study.engine import Engine
+from shapespace.study.frame import Frame
+from shapespace.study.scenario import Scenario
+from shapespace.study.store import RunStore
+
+POINTS = 241
+CONVENTIONS = (
+    "u = 0 upper pole or apex, u = 1 lower pole or rim; r' = h cos psi, z' = -h sin psi; outward normal "
+    "(sin psi, cos psi); curvatures positive on a sphere; velocities in the lab frame"
+)
+
+
+def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome | None) -> xr.Dataset:
+    """Fields (time, point) on points that follow each frame's mesh, observables (time); NaN where one does not apply."""
+    engine, frames = Engine.of(scenario), list(frames)
+    scales = scenario.scales
+    times = np.array([frame.time for frame in frames])
+    fields = [_fields(engine, frame) for frame in frames]
+    if "velocity" in frames[-1].observables:
+        travelled = _travelled(frames) / scales.factor("length")
+        for column, shift in zip(fields, travelled, strict=True):
+            column["axial_position"] = column["axial_position"] + shift
+    data = {
+        name: (("time", "point"), np.stack([column[name] for column in fields]) * scales.factor(name))
+        for name in fields[0]
+    }
+    names = dict.fromkeys(name for frame in frames for name in frame.observables)
+    observables = {
+        name: ("time", np.array([frame.observables.get(name, np.nan) for frame in frames])) for name in names
+    }
+    dataset = xr.Dataset({**data, **observables}, coords={"time": times})
+    for name, variable in dataset.variables.items():
+        quantity = QUANTITIES[str(name)]
+        variable.attrs |= {"long_name": quantity.meaning, "symbol": quantity.symbol, "units": scales.unit(str(name))}
+    dataset.attrs |= {
+        "scenario": scenario.name,
+        "model": scenario.model,
+        "outcome": str(outcome) if outcome else "unfinished",
+        "parameters": json.dumps(scenario.values()),
+        "conventions": CONVENTIONS,
+    }
+    return dataset
+
+
+def open_dataset(path: str | Path) -> xr.Dataset:
+    """The dataset of a stored run, finished or not."""
+    store = RunStore.open(path)
+    dataset = make_dataset(store.scenario, (store.read(i) for i in range(len(store))), store.outcome)
+    dataset.attrs |= {"created": store.created, "shapespace_version": store.versions["shapespace"]}
+    return dataset
+
+
+def _travelled(frames: list[Frame]) -> Array:
+    """Distance (frames,) that the comoving frame has swum, by the trapezoidal rule over the steps."""
+    times = np.array([frame.time for frame in frames])
+    speeds = np.array([frame.observables.get("velocity", 0.0) for frame in frames])
+    return np.concatenate([[0.0], np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * np.diff(times))])
+
+
+def _fields(engine: Engine, frame: Frame) -> dict[str, Array]:
+    """Dimensionless fields (point,) of one frame, sampled evenly over its elements."""
+    system = engine.system
+    state = State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)
+    u = np.interp(np.linspace(0.0, len(frame.mesh) - 1.0, POINTS), np.arange(len(frame.mesh)), frame.mesh)
+    y = dict(zip(system.fields, state.values(u).T, strict=True))
+    dpsi = state.derivatives(u)[:, system.fields.index("psi")]
+    h = frame.scalars[0]
+    # At the poles the azimuthal curvature tends to the meridional one; the first and last points are the poles or the rim.
+    at_axis = np.array([i in (0, POINTS - 1) and "p" in system.scalars or i == 0 for i in range(POINTS)])
+    azimuthal = np.where(at_axis, dpsi / h, np.sin(y["psi"]) / np.where(at_axis, 1.0, y["r"]))
+    rates = State(frame.mesh, frame.nodes, frame.slopes, frame.rates, frame.scalars).algebraic_values(u)
+    v0 = frame.scalars[system.scalars.index("v0")] if "v0" in system.scalars else 0.0
+    out = {
+        "mesh_coordinate": u,
+        "radius": np.where(at_axis, 0.0, y["r"]),
+        "axial_position": y["z"],
+        "tangent_angle": y["psi"],
+        "meridional_curvature": dpsi / h,
+        "azimuthal_curvature": azimuthal,
+        "tangential_velocity": y["v"],
+        "normal_velocity": np.sin(y["psi"]) * rates[:, 0] + np.cos(y["psi"]) * (rates[:, 1] + v0),
+    }
+    if "c" in y:
+        out["concentration"] = y["c"]
+    if "gamma" in system.algebraic:
+        out["local_tension"] = state.algebraic_values(u)[:, 0]
+    if "area" in y:
+        out["local_spontaneous_curvature"] = _coat(engine, y["area"])
+    return out
+
+
+def _coat(engine: Engine, area: Array) -> Array:
+    """C0 at cumulative areas (point,)."""
+    return np.asarray(local_spontaneous_curvature(engine.system.named(engine.p), area))

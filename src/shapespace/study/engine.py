@@ -1,0 +1,97 @@
+"""A scenario as a problem: the model's system on a mesh, its parameters and its initial state, all dimensionless."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from shapespace.base.arrays import Array
+from shapespace.models.closed_surface import make_closed_surface
+from shapespace.models.open_membrane import make_open_membrane
+from shapespace.numerics.collocation import CollocationProblem
+from shapespace.numerics.gauss import gauss_rule
+from shapespace.numerics.mesh import uniform_mesh
+from shapespace.numerics.state import State, state_from_functions
+from shapespace.study.scenario import Scenario
+from shapespace.variational.surface import SurfaceSystem
+
+_SYSTEMS = {
+    ("closed-surface", False): make_closed_surface(),
+    ("closed-surface", True): make_closed_surface(azimuthal=True),
+    ("open-membrane", False): make_open_membrane(),
+    ("open-membrane", True): make_open_membrane(azimuthal=True),
+}
+
+
+@dataclass(frozen=True)
+class Engine:
+    """What a scenario computes with. p: parameters (n_p,) in the system's order."""
+
+    problem: CollocationProblem
+    p: Array
+    values: dict[str, float]
+
+    @property
+    def system(self) -> SurfaceSystem:
+        """The surface's system."""
+        system = self.problem.system
+        assert isinstance(system, SurfaceSystem)
+        return system
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "Engine":
+        """The engine of a scenario on its initial, uniform mesh."""
+        numerics = scenario.numerics
+        system = _SYSTEMS[scenario.model, numerics.azimuthal_flow]
+        values = {"rotation_rate": 0.0, **scenario.dimensionless()}
+        if scenario.model == "closed-surface":
+            values["enclosed_volume"] = 4.0 / 3.0 * np.pi * values["sphere_radius"] ** 3
+        p = np.array([values[name] for name in system.parameters])
+        mesh = uniform_mesh(numerics.elements)
+        n_integrals = 1 if scenario.model == "closed-surface" else 0
+        return cls(CollocationProblem(system, mesh, numerics.degree, n_integrals, numerics.mesh_tolerance), p, values)
+
+    def initial_state(self) -> State:
+        """The sphere or the flat disc at rest, with the initial concentration; multipliers are first guesses."""
+        rule, mesh = gauss_rule(self.problem.degree), self.problem.mesh
+        stages = mesh[:-1, None] + np.diff(mesh)[:, None] * rule.points
+        functions = self._sphere if "p" in self.system.scalars else self._disc
+        scalars = functions(mesh)[2]
+        values = self._columns(functions(mesh)[0])
+        slopes = self._columns(functions(stages)[1])
+        algebraic = np.full((*stages.shape, len(self.system.algebraic)), self.values.get("boundary_tension", 0.0))
+        return state_from_functions(mesh, self.problem.degree, values, slopes, algebraic, scalars)
+
+    def _columns(self, functions: dict[str, Array]) -> Array:
+        zero = np.zeros_like(functions["r"])
+        return np.stack([functions.get(name, zero) for name in self.system.fields], axis=-1)
+
+    def _sphere(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], Array]:
+        """Fields, their slopes, and (h, p, v0) of the resting sphere with the scenario's initial concentration."""
+        v, radius = self.values, self.values["sphere_radius"]
+        angle, width = np.pi * u, v["ring_width"]
+        ring = v["initial_ring_amplitude"] * np.exp(-(((u - 0.5) / width) ** 2))
+        seed = 1.0 + v["seed_amplitude"] * np.cos(angle)
+        c0 = v["reference_concentration"]
+        c = c0 * (v["initial_background"] + ring) * seed
+        dring = -2.0 * (u - 0.5) / width**2 * ring
+        dc = c0 * (
+            dring * seed - (v["initial_background"] + ring) * v["seed_amplitude"] * np.pi * np.sin(angle)
+        )
+        tension = v["tension"] + v["active_tension"] * c0**2 / (c0**2 + v["saturation_concentration"] ** 2)
+        curvature = v["bending_rigidity"] * (2.0 / radius - v["spontaneous_curvature"])
+        amplitudes = {"r": radius, "moment": radius * curvature, "meridional_force": radius * tension}
+        fields = {name: a * np.sin(angle) for name, a in amplitudes.items()}
+        slopes = {name: np.pi * a * np.cos(angle) for name, a in amplitudes.items()}
+        fields |= {"z": radius * np.cos(angle), "psi": angle, "c": c}
+        slopes |= {"z": -np.pi * radius * np.sin(angle), "psi": np.full_like(u, np.pi), "c": dc}
+        c_0 = v["spontaneous_curvature"]
+        pressure = 2.0 * tension / radius + v["bending_rigidity"] * c_0 * (c_0 * radius - 2.0) / radius**2
+        return fields, slopes, np.array([np.pi * radius, pressure, 0.0])
+
+    def _disc(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], Array]:
+        """Fields, their slopes, and (h,) of the flat disc at the reservoir's tension."""
+        radius, tension = self.values["base_radius"], self.values["boundary_tension"]
+        fields = {"r": radius * u, "area": 0.5 * (radius * u) ** 2, "meridional_force": tension * radius * u}
+        one = np.ones_like(u)
+        slopes = {"r": radius * one, "area": radius**2 * u, "meridional_force": tension * radius * one}
+        return fields, slopes, np.array([radius])

@@ -1,0 +1,65 @@
+"""One accepted time step: all that is needed to look at it and to go on from it."""
+
+import io
+import struct
+import zipfile
+import zlib
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_ARRAYS = ("mesh", "nodes", "slopes", "algebraic", "scalars", "rates")
+
+# What reading bytes that are not those of a frame may raise.
+DAMAGE = (zipfile.BadZipFile, ValueError, KeyError, EOFError, OSError, RuntimeError, struct.error, zlib.error)
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The state after a time step. Arrays are dimensionless; times and observables are in the scenario's units.
+
+    Shapes, for N elements of k Gauss points with n differential and na algebraic fields and ns scalars: mesh (N+1,),
+    nodes (N+1, n), slopes (N, k, n), algebraic (N, k, na), scalars (ns,), rates (N, k, nq) of the stored quantities. `step` is the step that led here (0 for the
+    initial state), `next_step` the one to try next. An observable that does not apply is absent, never NaN.
+    """
+
+    time: float
+    step: float
+    next_step: float
+    mesh: Array
+    nodes: Array
+    slopes: Array
+    algebraic: Array
+    scalars: Array
+    rates: Array
+    observables: dict[str, float] = field(default_factory=dict)
+
+
+def encode_frame(frame: Frame) -> bytes:
+    """The bytes of a frame's file, a zip archive of arrays with the CRC of each."""
+    buffer = io.BytesIO()
+    arrays = {name: np.asarray(getattr(frame, name), dtype=np.float64) for name in _ARRAYS}
+    np.savez(
+        buffer,
+        clock=np.array([frame.time, frame.step, frame.next_step], dtype=np.float64),
+        observable_names=np.array(list(frame.observables), dtype="S"),
+        observable_values=np.array(list(frame.observables.values()), dtype=np.float64),
+        **arrays,  # type: ignore[arg-type]  # numpy's own flag is not among the names
+    )
+    return buffer.getvalue()
+
+
+def decode_frame(data: bytes) -> Frame:
+    """The frame in the bytes of a file; one of DAMAGE where the bytes are not what was written."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        if broken := archive.testzip():
+            raise zipfile.BadZipFile(f"checksum of {broken}")
+    with np.load(io.BytesIO(data), allow_pickle=False) as file:
+        arrays: dict[str, Array] = {name: file[name] for name in _ARRAYS}
+        time, step, next_step = map(float, file["clock"])
+        names = [name.decode() for name in file["observable_names"].tolist()]
+        values = file["observable_values"].tolist()
+    return Frame(time, step, next_step, **arrays, observables=dict(zip(names, values, strict=True)))

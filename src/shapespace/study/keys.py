@@ -1,0 +1,218 @@
+"""The flat key space of scenarios: sections, twins, the reading of `key=value` text, and the nearest valid key.
+
+A key names one thing wherever it is written, so `-s key=value` needs no section. A twin is a second way to state a key:
+
+    peclet                       active_tension = peclet diffusivity bulk_viscosity / sphere_radius^2
+    inverse_hydrodynamic_length  friction = bulk_viscosity (inverse_hydrodynamic_length / sphere_radius)^2
+    enclosed_volume              4 pi sphere_radius^3 / 3 = enclosed_volume
+"""
+
+import difflib
+import math
+from collections.abc import Callable, Iterable, Mapping
+from numbers import Integral, Real
+from typing import Any, NamedTuple, cast
+
+from shapespace.base.errors import InputError
+from shapespace.base.scales import QUANTITIES
+from shapespace.study.parameters import (
+    ClosedSurfaceInitial,
+    ClosedSurfaceParameters,
+    Numerics,
+    OpenMembraneInitial,
+    OpenMembraneParameters,
+    Record,
+    RunSettings,
+    complaint,
+    shown,
+)
+
+Value = float | int | bool
+Keys = Mapping[str, Value]
+Formula = Callable[[Mapping[str, float]], float]
+
+
+class Twin(NamedTuple):
+    """An alternative key: the key it sets and the formulas both ways, on the parameters."""
+
+    sets: str
+    to_key: Formula
+    from_key: Formula
+    least: float = -math.inf
+    is_open: bool = False
+
+
+# In the order in which they are resolved: the later formulas need the radius.
+_CLOSED_TWINS = {
+    "enclosed_volume": Twin(
+        "sphere_radius",
+        lambda p: math.cbrt(p["enclosed_volume"] / (4.0 * math.pi / 3.0)),
+        lambda p: 4.0 * math.pi / 3.0 * p["sphere_radius"] ** 3,
+        least=0.0,
+        is_open=True,
+    ),
+    "peclet": Twin(
+        "active_tension",
+        lambda p: p["peclet"] * p["diffusivity"] * p["bulk_viscosity"] / p["sphere_radius"] ** 2,
+        lambda p: p["active_tension"] * p["sphere_radius"] ** 2 / (p["diffusivity"] * p["bulk_viscosity"]),
+    ),
+    "inverse_hydrodynamic_length": Twin(
+        "friction",
+        lambda p: p["bulk_viscosity"] * (p["inverse_hydrodynamic_length"] / p["sphere_radius"]) ** 2,
+        lambda p: p["sphere_radius"] * math.sqrt(p["friction"] / p["bulk_viscosity"]),
+        least=0.0,
+    ),
+}
+
+
+class Model(NamedTuple):
+    """The records that a model needs, by section, and its twins."""
+
+    sections: dict[str, type[Record]]
+    twins: dict[str, Twin]
+
+    @property
+    def section_of(self) -> dict[str, str]:
+        """The section of every key, twins included, in the order of the records."""
+        keys = {key: section for section, record in self.sections.items() for key in record.model_fields}
+        return keys | dict.fromkeys(self.twins, "parameters")
+
+    def type_of(self, key: str) -> type:
+        """float, int or bool."""
+        if key in self.twins:
+            return float
+        return cast("type", self.sections[self.section_of[key]].model_fields[key].annotation)
+
+    def rival_of(self, key: str) -> str | None:
+        """The key that states the same thing: of a twin the key it sets, of that key the twin."""
+        if key in self.twins:
+            return self.twins[key].sets
+        return next((name for name, twin in self.twins.items() if twin.sets == key), None)
+
+
+MODELS = {
+    "closed-surface": Model(
+        {
+            "parameters": ClosedSurfaceParameters,
+            "initial": ClosedSurfaceInitial,
+            "run": RunSettings,
+            "numerics": Numerics,
+        },
+        _CLOSED_TWINS,
+    ),
+    "open-membrane": Model(
+        {
+            "parameters": OpenMembraneParameters,
+            "initial": OpenMembraneInitial,
+            "run": RunSettings,
+            "numerics": Numerics,
+        },
+        {},
+    ),
+}
+
+
+def nearest(name: str, candidates: Iterable[str]) -> str:
+    """The candidate most like a name; a symbol from the formulas (kappa, Pe) finds its key."""
+    candidates = list(candidates)
+    for key in candidates:
+        if key in QUANTITIES and QUANTITIES[key].symbol.lower() == name.lower():
+            return key
+    return difflib.get_close_matches(name.lower(), candidates, n=1, cutoff=0.0)[0]
+
+
+def check_key(key: str, value: object, model: str) -> None:
+    """Raise InputError unless the model has this key, naming the nearest one that it has."""
+    keys = MODELS[model].section_of
+    if key not in keys:
+        others = [name for name, other in MODELS.items() if key in other.section_of]
+        known = f" (it belongs to {others[0]})" if others else ""
+        raise InputError(
+            f"{key} = {shown(value)}: unknown key in a {model} scenario{known}; the nearest valid one is "
+            f"{nearest(key, keys)}."
+        )
+
+
+def typed(key: str, value: object, model: str) -> Value:
+    """A value as plain Python number or bool; text is read as the key's type. InputError where it cannot be."""
+    if isinstance(value, str):
+        return _read_text(key, value, MODELS[model].type_of(key))
+    # NumPy's numbers are numbers; its bool_ has no place in numbers.Real and is left to fail the check.
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return value  # type: ignore[return-value]  # the record's own check speaks about it
+    if isinstance(value, Integral) and MODELS[model].type_of(key) is not float:
+        return int(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise InputError(complaint(key, value, "must fit into a double-precision number")) from None
+
+
+def _read_text(key: str, text: str, kind: type) -> Value:
+    if kind is bool:
+        if text.strip().lower() not in ("true", "false"):
+            raise InputError(complaint(key, text, "must be true or false"))
+        return text.strip().lower() == "true"
+    try:
+        return int(text) if kind is int else float(text)
+    except ValueError:
+        must = "must be a whole number" if kind is int else "must be a number"
+        raise InputError(complaint(key, text, must)) from None
+
+
+def replace_keys(given: Keys, changes: Mapping[str, object], model: str) -> dict[str, Value]:
+    """The given keys with changes; a changed key replaces its twin, and changing both of a pair is an error."""
+    result = dict(given)
+    for key, value in changes.items():
+        check_key(key, value, model)
+        rival = MODELS[model].rival_of(key)
+        if rival is not None and rival in changes:
+            raise InputError(
+                f"{key} = {shown(value)} and {rival} = {shown(changes[rival])}: state one thing twice; give only one."
+            )
+        result.pop(rival or key, None)
+        result[key] = typed(key, value, model)
+    return result
+
+
+def make_parameters(given: Mapping[str, Any], model: str) -> Record:
+    """The parameters record with every twin replaced by the key it sets; InputError names the key as it was given."""
+    record, twins = MODELS[model].sections["parameters"], MODELS[model].twins
+    used = {name: twin for name, twin in twins.items() if name in given}
+    for name, twin in used.items():
+        _check_twin(name, given[name], twin)
+    plain = {key: value for key, value in given.items() if key not in used}
+    # First with any number in place of what the twins set, so that a bad key is named before a formula meets it.
+    values = record(**plain, **{twin.sets: 1.0 for twin in used.values()}).model_dump()
+    for name, twin in used.items():
+        values[twin.sets] = _finite(name, given[name], twin.to_key, values | {name: given[name]})
+    return record(**values)
+
+
+def twin_values(parameters: Mapping[str, float], given: Keys, model: str) -> dict[str, float]:
+    """The value of every twin: as given, or from the parameters."""
+    return {
+        name: float(given[name])
+        if name in given
+        else _finite(twin.sets, parameters[twin.sets], twin.from_key, parameters)
+        for name, twin in MODELS[model].twins.items()
+    }
+
+
+def _check_twin(name: str, value: object, twin: Twin) -> None:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(complaint(name, value, "must be a number (and not quoted)"))
+    if not math.isfinite(value):
+        raise InputError(complaint(name, value, "must be a finite number"))
+    if value < twin.least or (twin.is_open and value == twin.least):
+        raise InputError(complaint(name, value, f"must be {'>' if twin.is_open else '>='} {twin.least:g}"))
+
+
+def _finite(key: str, value: object, formula: Formula, parameters: Mapping[str, float]) -> float:
+    try:
+        result = formula(parameters)
+    except (OverflowError, ZeroDivisionError):
+        result = math.inf
+    if not math.isfinite(result):
+        raise InputError(complaint(key, value, "is out of the range of double precision beside the other parameters"))
+    return result

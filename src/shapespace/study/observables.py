@@ -1,0 +1,99 @@
+"""Observables of a state, by their contract names, dimensionless."""
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+from shapespace.base.arrays import Array
+from shapespace.base.problem import Rate
+from shapespace.numerics.state import State
+from shapespace.study.engine import Engine
+from shapespace.variational.ledger import densities
+
+_SAMPLES_PER_ELEMENT = 4
+
+
+def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
+    """All observables of one state in motion that need no other moment; `energy` is F, for the energy law."""
+    problem, system = engine.problem, engine.system
+    state = problem.unpack(x)
+    column = {name: i for i, name in enumerate(system.fields)}
+    integrals, peaks = problem.integrals(densities, x, engine.p, rate)
+    scalars = dict(zip(system.scalars, state.scalars.tolist(), strict=True))
+    first, last = state.nodes[0], state.nodes[-1]
+    out = {
+        "height": first[column["z"]] - last[column["z"]],
+        "length": scalars["h"],
+        "equator_radius": float(state.values(np.array([0.5]))[0, column["r"]]),
+        "max_meridional_curvature": peaks["curvature"],
+        **{name: integrals[name] for name in ("area", "bending_energy", "dissipation", "energy", "external_power")},
+    }
+    neck = neck_radius(state, column["r"], column["psi"])
+    if neck is not None:
+        out["neck_radius"] = neck
+    if "p" in scalars:
+        out |= _closed(engine, state, column, integrals, scalars)
+    else:
+        # The rim lets matter in at the reservoir's tension, which does work on the membrane.
+        out["external_power"] += 2.0 * np.pi * last[column["meridional_force"]] * last[column["v"]]
+        out["tension_pole"] = float(state.algebraic_values(np.array([0.0]))[0, 0])
+        out["pulling_force"] = integrals["pulling_force"]
+        out["pulling_force_per_2pi"] = integrals["pulling_force"] / (2.0 * np.pi)
+    return {name: float(value) for name, value in out.items()}
+
+
+def _closed(
+    engine: Engine, state: State, column: dict[str, int], integrals: dict[str, float], scalars: dict[str, float]
+) -> dict[str, float]:
+    """Observables that only a closed surface with a regulator has."""
+    v = engine.values
+    c_pole = state.nodes[0, column["c"]]
+    poles = state.derivatives(np.array([0.0, 1.0]))[:, column["psi"]]
+    position, largest = largest_value(state, column["c"])
+    area, volume = integrals["area"], integrals["volume"]
+    return {
+        "volume": volume,
+        "reduced_volume": 6.0 * np.sqrt(np.pi) * volume / area**1.5,
+        "pressure": scalars["p"],
+        "velocity": scalars["v0"],
+        "polarity": 1.0 - poles[0] / poles[1],
+        "tension_pole": v["tension"] + v["active_tension"] * c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2),
+        "max_concentration": largest,
+        "ring_position": position,
+        "chemical_power": integrals["chemical_power"],
+    }
+
+
+def _samples(state: State) -> Array:
+    """Points (m,) that resolve the state: a few per element, and u = 1/2."""
+    fractions = np.arange(_SAMPLES_PER_ELEMENT) / _SAMPLES_PER_ELEMENT
+    points = state.mesh[:-1, None] + state.widths[:, None] * fractions
+    return np.union1d(np.append(points.ravel(), 1.0), [0.5])
+
+
+def neck_radius(state: State, r: int, psi: int) -> float | None:
+    """The smallest r at an interior local minimum of r(u), where cos(psi) rises through zero; None without one."""
+    u = _samples(state)
+    slope = np.cos(state.values(u)[:, psi])
+    rising = np.flatnonzero((slope[:-1] < 0.0) & (slope[1:] >= 0.0))
+    radii = []
+    for i in rising:
+        at = brentq(lambda x: float(np.cos(state.values(np.array([x]))[0, psi])), u[i], u[i + 1], xtol=1e-14)
+        radii.append(float(state.values(np.array([at]))[0, r]))
+    return min(radii) if radii else None
+
+
+def largest_value(state: State, field: int) -> tuple[float, float]:
+    """Where a field is largest, and its value there; a uniform field has its largest value in the middle."""
+    u = _samples(state)
+    values = state.values(u)[:, field]
+    top = float(values.max())
+    if top - float(values.min()) <= 1e-12 * max(abs(top), 1.0):
+        return 0.5, top
+    i = int(values.argmax())
+    if i in (0, len(u) - 1):
+        return float(u[i]), top
+    found = minimize_scalar(
+        lambda x: -float(state.values(np.array([x]))[0, field]), bounds=(u[i - 1], u[i + 1]), method="bounded",
+        options={"xatol": 1e-10},
+    )  # fmt: skip
+    return (float(found.x), -float(found.fun)) if -found.fun >= top else (float(u[i]), top)

@@ -1,0 +1,119 @@
+"""Run a scenario: make or continue its store, and append every accepted time step before anyone hears of it."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+from shapespace.base.errors import InputError
+from shapespace.base.outcome import Outcome
+from shapespace.study.frame import Frame
+from shapespace.study.scenario import Scenario
+from shapespace.study.store import RunStore, holds_run, is_free
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Called after each new frame with the frame and the number of steps so far.
+Progress = Callable[[Frame, int], None]
+
+# As many frames as a multistep method needs to go on as if it had not been stopped.
+HISTORY = 4
+
+# Ends that a resumed run keeps, since nothing more would happen.
+_FINAL = {Outcome.STATIONARY, Outcome.NECK_CLOSED}
+
+
+@dataclass(frozen=True)
+class Run:
+    """How a run ended and what it left. `steps` counts from the initial state, `wall_time` is in seconds of this call.
+
+    `observables` are those of the last frame, in the scenario's units. `frames` are there only for a run without store.
+    """
+
+    outcome: Outcome
+    scenario: Scenario
+    store: Path | None
+    observables: dict[str, float]
+    steps: int
+    wall_time: float
+    frames: tuple[Frame, ...] = ()
+
+    @property
+    def dataset(self) -> "xr.Dataset":
+        """All frames as fields along the curve and observables over time, with units."""
+        # Imported late: xarray takes longer to load than a stored run to be found finished.
+        from shapespace.study.dataset import make_dataset, open_dataset
+
+        if self.store is None:
+            return make_dataset(self.scenario, self.frames, self.outcome)
+        return open_dataset(self.store)
+
+
+def run(
+    scenario: Scenario, *, out: str | Path | None = None, resume: bool = False, progress: Progress | None = None
+) -> Run:
+    """Simulate a scenario to its end and return the Run; its outcome says whether the solver gave up.
+
+    `out` is the directory of the store, new or empty; without it the frames are kept in memory. With `resume` a store
+    in `out` is continued; one that has already ended as asked is left as it is. InputError and StoreError before
+    anything is computed; StoreError when the disk fills up, with all frames so far intact.
+    """
+    start = perf_counter()
+    if out is None:
+        if resume:
+            raise InputError("resume = True: needs the directory of a stored run; give it as out.")
+        frames: list[Frame] = []
+        outcome = _simulate(scenario, [], 0, frames.append, progress)
+        return Run(
+            outcome, scenario, None, frames[-1].observables, len(frames) - 1, perf_counter() - start, tuple(frames)
+        )
+    continues = resume and holds_run(out)
+    with RunStore.resume(out, scenario) if continues else RunStore.create(out, scenario) as store:
+        outcome = _advance(store, progress)
+        last = store.read(-1)
+        return Run(outcome, store.scenario, store.path, last.observables, len(store) - 1, perf_counter() - start)
+
+
+def free_path(name: str, root: str | Path = "results") -> Path:
+    """The first of root/name, root/name-2, ... in which a new run can be created."""
+    path, number = Path(root) / name, 1
+    while not is_free(path):
+        number += 1
+        path = Path(root) / f"{name}-{number}"
+    return path
+
+
+def _advance(store: RunStore, progress: Progress | None) -> Outcome:
+    """Bring a store to its scenario's end, where it is not there yet."""
+    history = store.last(HISTORY)
+    if store.outcome in _FINAL:
+        return store.outcome
+    settings = store.scenario.run
+    end = None
+    if history and history[-1].time >= settings.until * (1 - 1e-12):
+        end = Outcome.REACHED_END
+    elif len(store) > settings.max_steps:
+        end = Outcome.MAX_STEPS
+    if end is None or end != store.outcome:
+        end = end or _simulate(store.scenario, history, len(store), store.append, progress)
+        store.finish(end)
+    return end
+
+
+def _simulate(
+    scenario: Scenario, history: list[Frame], count: int, record: Callable[[Frame], None], progress: Progress | None
+) -> Outcome:
+    """Record frame after frame; `count` frames are there already, of which `history` are the last."""
+    # Imported late: with it comes the array library, which a bad request should not have to wait for.
+    from shapespace.study.simulation import Simulation
+
+    # The simulation counts its own steps; the limit is on those of the whole run.
+    left = scenario.run.max_steps - max(0, count - 1)
+    simulation = Simulation(scenario.with_overrides({"max_steps": left}), history)
+    for number, frame in enumerate(simulation, start=count):
+        record(frame)
+        if progress is not None:
+            progress(frame, number)
+    return simulation.outcome

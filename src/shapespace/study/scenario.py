@@ -1,0 +1,217 @@
+"""Scenarios: everything that defines one run, as typed and immutable records, and the ways to get one.
+
+scenario("guided-division", peclet=300)     a built-in one, with changes
+load_scenario("mine.toml")                  one from a file, as `template(name)` shows
+s.with_overrides({"elements": "80"})        a changed copy; text is read as on the command line
+"""
+
+import difflib
+import re
+import tomllib
+from collections.abc import Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any, Self
+
+from shapespace.base.errors import InputError
+from shapespace.base.scales import Scales
+from shapespace.study.keys import MODELS, Value, check_key, make_parameters, nearest, replace_keys, twin_values
+from shapespace.study.parameters import (
+    ClosedSurfaceInitial,
+    ClosedSurfaceParameters,
+    Numerics,
+    OpenMembraneInitial,
+    OpenMembraneParameters,
+    Record,
+    RunSettings,
+    complaint,
+    shown,
+)
+
+# What a resumed run may change: how far it goes, not what it computes.
+FREE_ON_RESUME = ("until", "max_steps")
+
+_NAMES = ("guided-division", "ring-slipping", "polar-swimmer", "membrane-protrusion")
+_SECTIONS = ("parameters", "initial", "run", "numerics")
+
+
+class Scenario(Record):
+    """One run, fully stated. Make it with `scenario`, `load_scenario` or `Scenario.from_keys`.
+
+    `given` holds the keys as they were written, twins included: a scenario that states `peclet` keeps its Peclet number
+    when `with_overrides` changes the diffusivity. `parameters` is resolved: every physical key has its value there.
+    """
+
+    name: str
+    model: str
+    parameters: ClosedSurfaceParameters | OpenMembraneParameters
+    initial: ClosedSurfaceInitial | OpenMembraneInitial
+    run: RunSettings
+    numerics: Numerics
+    given: tuple[tuple[str, Value], ...]
+
+    @classmethod
+    def from_keys(cls, name: Any, model: Any, keys: Mapping[str, object]) -> Self:
+        """A scenario from keys in any order (run and numerics have defaults). InputError names the first bad key."""
+        if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}", name):
+            raise InputError(f"name = {name!r}: must be of letters, digits, '.', '_' and '-', as it names a directory.")
+        _check_model(model)
+        given = replace_keys({}, keys, model)
+        sections = MODELS[model].sections
+        by_section: dict[str, dict[str, Value]] = {section: {} for section in sections}
+        for key, value in given.items():
+            by_section[MODELS[model].section_of[key]][key] = value
+        records: dict[str, Any] = {section: sections[section](**by_section[section]) for section in _SECTIONS[1:]}
+        records["parameters"] = make_parameters(by_section["parameters"], model)
+        made = cls(name=name, model=model, given=tuple(given.items()), **records)
+        made.dimensionless()
+        made.twins()
+        return made
+
+    @classmethod
+    def from_dict(cls, stored: Mapping[str, Any]) -> Self:
+        """The scenario that `as_dict` described, bit for bit."""
+        return cls.from_keys(stored["name"], stored["model"], stored["given"])
+
+    def with_overrides(self, overrides: Mapping[str, object]) -> Self:
+        """A copy with some keys changed; a value may be text, read as the key's type."""
+        if not overrides:
+            return self
+        return type(self).from_keys(self.name, self.model, replace_keys(dict(self.given), overrides, self.model))
+
+    @property
+    def scales(self) -> Scales:
+        """The scales that make this scenario dimensionless."""
+        return Scales.of(self.parameters.model_dump())
+
+    def dimensionless(self) -> dict[str, float]:
+        """All real-valued keys, times included, in units of the scales: what the solver works with."""
+        values = self.sections()
+        reals = {key: value for section in values.values() for key, value in section.items() if type(value) is float}
+        return self.scales.to_dimensionless(reals)
+
+    def twins(self) -> dict[str, float]:
+        """The alternative keys with their values (peclet, inverse_hydrodynamic_length, enclosed_volume)."""
+        return twin_values(self.parameters.model_dump(), dict(self.given), self.model)
+
+    def values(self) -> dict[str, Value]:
+        """Every key with its value, over all sections, twins included."""
+        sections = self.sections()
+        return sections["parameters"] | self.twins() | sections["initial"] | sections["run"] | sections["numerics"]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data for JSON: the keys as given, and the resolved values by section with the twins among them."""
+        sections = self.sections()
+        sections["parameters"] |= self.twins()
+        return {"name": self.name, "model": self.model, "given": dict(self.given), **sections}
+
+    def difference(self, other: "Scenario") -> str | None:
+        """What keeps `other` from being a continuation of this run: one phrase naming the key, or None."""
+        if self.model != other.model:
+            return f"model is {self.model}, not {other.model}"
+        mine, theirs = self.sections(), other.sections()
+        for section in _SECTIONS:
+            for key, value in mine[section].items():
+                if key not in FREE_ON_RESUME and theirs[section][key] != value:
+                    return f"{key} is {value!r}, not {theirs[section][key]!r}"
+        return None
+
+    def sections(self) -> dict[str, dict[str, Any]]:
+        return {section: getattr(self, section).model_dump() for section in _SECTIONS}
+
+
+def scenario_names() -> tuple[str, ...]:
+    """The built-in scenarios."""
+    return _NAMES
+
+
+def template(name: str) -> str:
+    """The commented TOML text of a built-in scenario."""
+    if name not in _NAMES:
+        close = difflib.get_close_matches(str(name).lower(), _NAMES, n=1, cutoff=0.0)[0]
+        raise InputError(
+            f"scenario {name!r}: there is none of this name; the nearest is {close}, all: {', '.join(_NAMES)}."
+        )
+    return resources.files("shapespace.study").joinpath("scenarios", f"{name}.toml").read_text(encoding="utf-8")
+
+
+def scenario(name: str, **overrides: object) -> Scenario:
+    """A built-in scenario with some keys changed, e.g. `scenario("guided-division", peclet=300, until=1)`."""
+    return _from_text(template(name)).with_overrides(overrides)
+
+
+def load_scenario(path: str | Path) -> Scenario:
+    """The scenario in a TOML file. InputError names the file, and the line or the key."""
+    try:
+        data = Path(path).read_bytes()
+    except FileNotFoundError:
+        raise InputError(f"{path}: there is no such file; `shapespace config NAME --out {path}` writes one.") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a directory; give the scenario's TOML file.") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{str(path)!r}: cannot be read ({getattr(error, 'strerror', None) or error}).") from None
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{path}, line {line}: is not UTF-8 text; save the scenario as UTF-8.") from None
+    try:
+        return _from_text(text)
+    except tomllib.TOMLDecodeError as error:
+        found = re.search(r"line (\d+)", str(error))
+        line = int(found[1]) if found else text.count("\n") + 1
+        raise InputError(
+            f"{path}, line {line}: is not valid TOML ({error}); correct the line, or write the file anew with "
+            "`shapespace config NAME`."
+        ) from None
+    except RecursionError:
+        raise InputError(
+            f"{path}: is nested too deeply for a scenario; write it anew with `shapespace config NAME`."
+        ) from None
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _from_text(text: str) -> Scenario:
+    """A scenario from TOML that must state every key, so that a file cut short is never taken for a whole one."""
+    document = tomllib.loads(text)
+    for entry in ("name", "model"):
+        if entry not in document:
+            raise InputError(
+                f'{entry}: is missing at the top; the file is cut short or no scenario: add {entry} = "...".'
+            )
+    name, model = document.pop("name"), document.pop("model")
+    _check_model(model)
+    keys: dict[str, object] = {}
+    for section, entries in document.items():
+        _check_section(section, entries, model)
+        keys |= entries
+    known = MODELS[model]
+    for key, section in known.section_of.items():
+        if key not in known.twins and key not in keys and known.rival_of(key) not in keys:
+            raise InputError(
+                f"{key}: is missing from [{section}]; the file is cut short or incomplete: add {key} = ...."
+            )
+    return Scenario.from_keys(name, model, keys)
+
+
+def _check_model(model: object) -> None:
+    if not isinstance(model, str) or model not in MODELS:
+        raise InputError(f"model = {shown(model)}: is unknown; the nearest valid one is {nearest(str(model), MODELS)}.")
+
+
+def _check_section(section: str, entries: object, model: str) -> None:
+    """Raise InputError unless this is a section that holds its own keys, none of them text."""
+    section_of = MODELS[model].section_of
+    if section in section_of:
+        raise InputError(f"{section} = {shown(entries)}: has no section; move it under [{section_of[section]}].")
+    if section not in _SECTIONS or not isinstance(entries, dict):
+        raise InputError(f"[{section}]: is unknown; the nearest valid section is [{nearest(section, _SECTIONS)}].")
+    for key, value in entries.items():
+        check_key(key, value, model)
+        if section_of[key] != section:
+            raise InputError(f"{key} = {shown(value)}: stands in [{section}]; move it under [{section_of[key]}].")
+        # Text in a file is a slip (`peclet = "450"`); only the command line's text is read as a number.
+        if isinstance(value, str):
+            must = {float: "a number", int: "a whole number", bool: "true or false"}[MODELS[model].type_of(key)]
+            raise InputError(complaint(key, value, f"must be {must}, without quotes"))

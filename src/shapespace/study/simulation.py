@@ -1,0 +1,105 @@
+"""The dynamics of a scenario: frames of accepted time steps, and why they ended."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from shapespace.analysis.bdf import derivative_weights
+from shapespace.analysis.evolution import Evolution, Moment, Stepping
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import Rate
+from shapespace.numerics.collocation import CollocationProblem
+from shapespace.numerics.state import State
+from shapespace.study.engine import Engine
+from shapespace.study.frame import Frame
+from shapespace.study.observables import measure, neck_radius
+from shapespace.study.scenario import Scenario
+
+CLOSING_RADIUS = 1e-4
+"""A neck thinner than this, in units of the surface's length scale, counts as closed."""
+
+
+class Simulation:
+    """Iterate for the frames of a scenario; afterwards `outcome` says why they ended.
+
+    history: the last frames of a stored run, to go on from; without them the first frame is the initial state.
+    """
+
+    def __init__(self, scenario: Scenario, history: Sequence[Frame] = ()) -> None:
+        self.scenario = scenario
+        self.history = list(history)
+        self.outcome = Outcome.REACHED_END
+        self._engine = Engine.of(scenario)
+        self._energies: list[tuple[float, float]] = []
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Frames one by one, each after its step was accepted."""
+        engine, time_scale = self._engine, self.scenario.scales.factor("time")
+        if self.history:
+            past = [self._moment(frame) for frame in self.history]
+            self._energies = [(frame.time / time_scale, frame.observables["energy"]) for frame in self.history]
+        else:
+            past = [Moment(0.0, engine.problem, engine.problem.pack(engine.initial_state()))]
+            yield self._frame(past[0], resting=True)
+        run = engine.values
+        stepping = Stepping(
+            order=1 if run["dt"] > 0.0 else 2,
+            fixed_step=run["dt"],
+            tolerance=run["time_tolerance"],
+            stationary_rate=run["stationary_rate"],
+            max_steps=self.scenario.run.max_steps,
+        )
+        evolution = Evolution(past, engine.p, run["until"], stepping, events=(self._neck_event,))
+        for moment in evolution:
+            yield self._frame(moment)
+        self.outcome = evolution.outcome or Outcome.REACHED_END
+
+    def _neck_event(self, moment: Moment) -> Outcome | None:
+        assert isinstance(moment.problem, CollocationProblem)
+        fields = self._engine.system.fields
+        neck = neck_radius(moment.problem.unpack(moment.x), fields.index("r"), fields.index("psi"))
+        return Outcome.NECK_CLOSED if neck is not None and neck < CLOSING_RADIUS else None
+
+    def _moment(self, frame: Frame) -> Moment:
+        """The moment of a stored frame."""
+        scale = self.scenario.scales.factor("time")
+        problem = self._engine.problem.on_mesh(frame.mesh)
+        state = State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)
+        return Moment(frame.time / scale, problem, problem.pack(state), frame.step / scale, frame.next_step / scale)
+
+    def _frame(self, moment: Moment, resting: bool = False) -> Frame:
+        """Everything to store of a moment; the initial state has no rates yet."""
+        problem = moment.problem
+        assert isinstance(problem, CollocationProblem)
+        engine = replace(self._engine, problem=problem)
+        rate = moment.rate or Rate(0.0, np.zeros_like(problem.stored(moment.x, engine.p)))
+        values = measure(engine, moment.x, rate)
+        values |= self._energy_law(moment.time, values)
+        if resting:
+            for name in ("dissipation", "chemical_power", "external_power", "energy_residual"):
+                values.pop(name, None)
+        state, scales = problem.unpack(moment.x), self.scenario.scales
+        return Frame(
+            time=moment.time * scales.factor("time"),
+            step=moment.step * scales.factor("time"),
+            next_step=moment.next_step * scales.factor("time"),
+            mesh=state.mesh,
+            nodes=state.nodes,
+            slopes=state.slopes,
+            algebraic=state.algebraic,
+            scalars=state.scalars,
+            rates=problem.rates(moment.x, engine.p, rate),
+            observables={name: value * scales.factor(name) for name, value in values.items()},
+        )
+
+    def _energy_law(self, time: float, values: dict[str, float]) -> dict[str, float]:
+        """dF/dt + 2 D - external - chemical power, with dF/dt by the differences that the step itself used."""
+        order = 1 if self._engine.values["dt"] > 0.0 else 2
+        self._energies = [*self._energies, (time, values["energy"])][-(order + 1) :]
+        if len(self._energies) < 2:
+            return {}
+        times, energies = (np.array(column)[::-1] for column in zip(*self._energies, strict=True))
+        change = float(derivative_weights(times) @ energies)
+        supply = values["external_power"] + values.get("chemical_power", 0.0)
+        return {"energy_residual": change + values["dissipation"] - supply}

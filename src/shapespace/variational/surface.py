@@ -1,0 +1,215 @@
+"""The first-order system of an axisymmetric fluid surface, assembled from terms, species, ends and constraints."""
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+
+from shapespace.base.arrays import Traced
+from shapespace.geometry.curve import Geometry, area_element, tangent_slopes, volume_element
+from shapespace.geometry.motion import Rates, divergence
+from shapespace.numerics.system import AbstractSystem
+from shapespace.physics.force import Pressure
+from shapespace.physics.species import Species
+from shapespace.physics.tension import Incompressibility
+from shapespace.physics.term import AbstractTerm, Site
+from shapespace.variational.ends import Ends, Free, Pinned, Traction, check_count, check_ends
+from shapespace.variational.rayleighian import Multipliers, Variation, variation
+
+TermFactory = Callable[[Any], tuple[AbstractTerm, ...]]
+
+STATE_AND_FLUX = {
+    "r": ("r", "alpha"),
+    "z": ("z", "beta"),
+    "psi": ("psi", "moment"),
+    "v": ("v", "meridional_force"),
+    "v_phi": ("v_phi", "azimuthal_force"),
+    "species": ("c", "species_flux"),
+}
+"""For each rate the field it changes and the flux conjugate to it."""
+
+
+class SurfaceSystem(AbstractSystem):
+    """Shape, flow and species of one surface: F = 0 at a point, derived from the Rayleigh density by differentiation.
+
+    Fields y: r, z, psi, moment = P_psi, alpha, beta, v = v_u, meridional_force = P_v = r T_uu, then as chosen v_phi and
+    P_phi, c and its flux N, the cumulative area a. Algebraic: gamma_H if incompressible. Scalars: h, then p if the
+    volume is fixed and v0 if the frame moves along. z is measured in that frame. Stored: r, z, psi, h and the amount c r h.
+    """
+
+    fields: tuple[str, ...] = eqx.field(static=True)
+    algebraic: tuple[str, ...] = eqx.field(static=True)
+    scalars: tuple[str, ...] = eqx.field(static=True)
+    parameters: tuple[str, ...] = eqx.field(static=True)
+    terms: TermFactory = eqx.field(static=True)
+    species: Callable[[Any], Species] | None = eqx.field(static=True)
+    ends: tuple[tuple[str, Any, Any], ...] = eqx.field(static=True)
+
+    def named(self, p: Traced) -> Any:
+        """Parameters by name."""
+        return SimpleNamespace(**{name: p[i] for i, name in enumerate(self.parameters)})
+
+    def field_values(self, y: Traced) -> dict[str, Traced]:
+        """Fields by name."""
+        return {name: y[i] for i, name in enumerate(self.fields)}
+
+    def scalar_values(self, s: Traced) -> dict[str, Traced]:
+        """Scalars by name."""
+        return {name: s[i] for i, name in enumerate(self.scalars)}
+
+    def stored(self, y: Traced, s: Traced) -> Traced:
+        """(r, z, psi, h[, c r h])."""
+        f, h = self.field_values(y), s[self.scalars.index("h")]
+        quantities = [f["r"], f["z"], f["psi"], h]
+        if self.species is not None:
+            quantities.append(f["c"] * f["r"] * h)
+        return jnp.stack(quantities)
+
+    def site(self, dy: Traced, y: Traced, s: Traced, dq: Traced) -> Site:
+        """The state of motion at one point."""
+        f, df, scalar = self.field_values(y), self.field_values(dy), self.scalar_values(s)
+        zero = jnp.zeros(())
+        rates = Rates(dq[0], dq[1] + scalar.get("v0", zero), dq[2], dq[3], f["v"], f.get("v_phi", zero))
+        # The density is linear in the gradients of dr/dt, dz/dt, dpsi/dt, dh/dt, so their values do not matter.
+        gradients = Rates(zero, zero, zero, zero, df["v"], df.get("v_phi", zero))
+        geometry = Geometry(f["r"], f["psi"], df["psi"], scalar["h"], f.get("area", zero))
+        return Site(geometry, rates, gradients, f.get("c", zero))
+
+    def all_terms(self, a: Traced, s: Traced, p: Traced) -> tuple[AbstractTerm, ...]:
+        """The model's terms and those of the constraints, whose multipliers are unknowns."""
+        terms = self.terms(self.named(p))
+        scalar = self.scalar_values(s)
+        if "p" in scalar:
+            terms = (*terms, Pressure(scalar["p"]))
+        if self.algebraic:
+            terms = (*terms, Incompressibility(a[0]))
+        return terms
+
+    def variation(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, p: Traced) -> Variation:
+        """dR/dw and dR/dw' at one point."""
+        f = self.field_values(y)
+        site = self.site(dy, y, s, dq)
+        return variation(self.all_terms(a, s, p), Multipliers(f["alpha"], f["beta"]), site)
+
+    def equations(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, u: Traced, p: Traced) -> Traced:
+        """Geometric relations, P' = dR/dw, definitions of the fluxes, species balance, constraints; one row per unknown."""
+        f, df = self.field_values(y), self.field_values(dy)
+        site = self.site(dy, y, s, dq)
+        force, flux = self.variation(dy, y, a, s, dq, p)
+        dr, dz = tangent_slopes(site.geometry)
+        rows = [
+            df["r"] - dr,
+            df["z"] - dz,
+            f["moment"] - flux.psi,
+            df["moment"] - force.psi,
+            df["alpha"] - force.r,
+            df["beta"] - force.z,
+            f["meridional_force"] - flux.meridional_velocity,
+            df["meridional_force"] - force.meridional_velocity,
+        ]
+        if "v_phi" in f:
+            rows += [
+                f["azimuthal_force"] - flux.azimuthal_velocity,
+                df["azimuthal_force"] - force.azimuthal_velocity,
+            ]
+        if self.species is not None:
+            species = self.species(self.named(p))
+            rows += [
+                f["species_flux"] - species.flux(site, df["c"]),
+                df["species_flux"] + dq[4] - species.source(site, u),
+            ]
+        if "area" in f:
+            rows.append(df["area"] - area_element(site.geometry))
+        if self.algebraic:
+            rows.append(divergence(site.geometry, site.rates, site.gradients))
+        return jnp.stack(rows)
+
+    def _end(self, name: str, end: Any, y: Traced, s: Traced, dq: Traced, p: Traced) -> Traced:
+        """The residual of one end condition."""
+        state, flux = STATE_AND_FLUX[name]
+        f = self.field_values(y)
+        if isinstance(end, Pinned):
+            return f[state] - end.value(self.named(p))
+        if isinstance(end, Free):
+            return f[flux]
+        return f[flux] - self._traction(jnp.asarray(end.tension(self.named(p))), y, s, dq, p)
+
+    def _traction(self, tension: Traced, y: Traced, s: Traced, dq: Traced, p: Traced) -> Traced:
+        """P_v at an end for a given tension there, on an incompressible surface (div v = 0 fixes v')."""
+        dy = jnp.zeros_like(y)
+        site = self.site(dy, y, s, dq)
+        v_slope = -site.geometry.h * divergence(site.geometry, site.rates, site.gradients)
+        dy = dy.at[self.fields.index("v")].set(v_slope)
+        return self.variation(dy, y, tension[None], s, dq, p).flux.meridional_velocity
+
+    def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:
+        """One row per end of each rate, the gauge alpha(0) = 0, the frame z(0) + z(1) = 0, the origin a(0) = 0."""
+        f0, f1, scalar = self.field_values(y0), self.field_values(y1), self.scalar_values(s)
+        rows = []
+        for name, start, stop in self.ends:
+            rows += [self._end(name, start, y0, s, dq0, p), self._end(name, stop, y1, s, dq1, p)]
+        rows.append(f0["alpha"])
+        if "v0" in scalar:
+            rows.append(f0["z"] + f1["z"])
+            # Without friction a translation meets no force: beta(1) = 0 then repeats beta(0) = 0, and v0 = 0 by choice.
+            axial = 2 * [name for name, _, _ in self.ends].index("z") + 1
+            rows[axial] = jnp.where(self.named(p).friction > 0.0, rows[axial], scalar["v0"])
+        if "area" in f0:
+            rows.append(f0["area"])
+        return jnp.stack(rows)
+
+    def integrands(self, dy: Traced, y: Traced, a: Traced, s: Traced, u: Traced, p: Traced) -> Traced:
+        """The volume element where the volume is fixed."""
+        if "p" not in self.scalars:
+            return jnp.zeros((0,))
+        return volume_element(self.site(dy, y, s, jnp.zeros(5)).geometry)[None]
+
+    def targets(self, s: Traced, p: Traced) -> Traced:
+        """The enclosed volume where it is fixed."""
+        return self.named(p).enclosed_volume[None] if "p" in self.scalars else jnp.zeros((0,))
+
+
+def make_surface_system(
+    parameters: tuple[str, ...],
+    terms: TermFactory,
+    ends: Ends,
+    *,
+    species: Callable[[Any], Species] | None = None,
+    incompressible: bool = False,
+    fixed_volume: bool = False,
+    comoving: bool = False,
+    azimuthal: bool = False,
+    material_area: bool = False,
+) -> SurfaceSystem:
+    """Choose the unknowns of a surface and check that conditions and unknowns balance.
+
+    Raises ValueError naming the missing or surplus condition.
+    """
+    fields = ["r", "z", "psi", "moment", "alpha", "beta", "v", "meridional_force"]
+    rates = ["r", "z", "psi", "v"]
+    if azimuthal:
+        fields += ["v_phi", "azimuthal_force"]
+        rates.append("v_phi")
+    if species is not None:
+        fields += ["c", "species_flux"]
+        rates.append("species")
+    if material_area:
+        fields.append("area")
+    scalars = ("h", *(["p"] if fixed_volume else []), *(["v0"] if comoving else []))
+    check_ends(ends, tuple(rates))
+    if not incompressible and any(isinstance(end, Traction) for pair in ends.values() for end in pair):
+        raise ValueError("a Traction end needs an incompressible surface; use Free or Pinned.")
+    conditions = [f"{name} at u = {u}" for name in rates for u in (0, 1)] + ["gauge alpha(0) = 0"]
+    conditions += ["frame z(0) + z(1) = 0"] * comoving + ["area(0) = 0"] * material_area
+    check_count(len(fields), scalars, conditions, ["enclosed volume"] * fixed_volume)
+    return SurfaceSystem(
+        fields=tuple(fields),
+        algebraic=("gamma",) if incompressible else (),
+        scalars=scalars,
+        parameters=parameters,
+        terms=terms,
+        species=species,
+        ends=tuple((name, *ends[name]) for name in rates),
+    )

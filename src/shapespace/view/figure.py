@@ -1,0 +1,208 @@
+"""The figure of a run: a curve over time, snapshots of the surface, and profiles of velocity and curvature below them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colorbar import Colorbar
+from matplotlib.figure import Figure, SubFigure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from shapespace.view import panels, style
+from shapespace.view.frames import Profile, Run, observable, progress_measure, read_run, snapshot_frames
+from shapespace.view.snapshot import Camera, SnapshotArtists, extent, make_camera, offset_of
+
+SNAPSHOTS = 5
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the figure of one scenario shows: the observable of the curve, a second one, and extras of the snapshots."""
+
+    curve: str
+    twin: str | None = None
+    with_swim: bool = False
+    with_inset: bool = False
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """The observables that the dataset must hold."""
+        return (self.curve, *([self.twin] if self.twin and self.twin != panels.GROWTH else []))
+
+
+_LAYOUTS = {
+    "membrane-protrusion": Layout("height", panels.GROWTH),
+    "ring-slipping": Layout("ring_position", "velocity", with_swim=True),
+    "polar-swimmer": Layout("ring_position", "velocity", with_swim=True),
+    "guided-division": Layout("equator_radius", with_inset=True),
+}
+_GENERIC_CURVES = ("equator_radius", "height", "neck_radius", "ring_position", "length", "area", "velocity")
+
+
+def layout_of(dataset: xr.Dataset) -> Layout:
+    """The layout by scenario name; for others by model and by which observables there are."""
+    scenario = str(dataset.attrs.get("scenario", ""))
+    if scenario in _LAYOUTS:
+        return _LAYOUTS[scenario]
+    if dataset.attrs.get("model") == "open-membrane":
+        return _LAYOUTS["membrane-protrusion"]
+    curve = next((name for name in _GENERIC_CURVES if name in dataset), _GENERIC_CURVES[0])
+    swims = "velocity" in dataset and curve != "velocity"
+    return Layout(curve, "velocity" if swims else None, with_swim=swims, with_inset=True)
+
+
+def plot_run(dataset: xr.Dataset) -> Figure:
+    """The figure of a stored run at 180 mm width; save it with `figure.savefig(path, dpi=300)`.
+
+    Layout by `dataset.attrs['scenario']`, else by its model: (a) an observable over time; (b) snapshots at instructive times,
+    all on one scale, over their profiles of velocity and curvature. Raises InputError for a dataset that cannot be drawn.
+    """
+    layout = layout_of(dataset)
+    run = read_run(dataset, layout.observables)
+    chosen = snapshot_frames(progress_measure(run, observable(dataset, layout.curve)), SNAPSHOTS)
+    profiles = [run.profile(float(k)) for k in chosen]
+    with style.house_style():
+        return _build(run, layout, chosen, profiles, make_camera(run, profiles))
+
+
+def _build(run: Run, layout: Layout, chosen: Sequence[int], profiles: Sequence[Profile], camera: Camera) -> Figure:
+    """All rows on one grid; its last, narrow column is for the colour bar."""
+    limits = common_limits(profiles, camera, with_swim=layout.with_swim)
+    columns = len(profiles)
+    cell_mm = (style.WIDTH_MM - 18) / max(columns, 3)
+    snapshots_mm = float(np.clip(cell_mm * (limits[3] - limits[2]) / (limits[1] - limits[0]), 18, 80)) + 8
+    heights_mm = [48.0, snapshots_mm, 84.0 if layout.with_inset else 66.0]
+    figure = Figure(figsize=(style.WIDTH_MM * style.MM, sum(heights_mm) * style.MM), layout="constrained")
+    FigureCanvasAgg(figure)
+    top, middle, bottom = figure.subfigures(3, 1, height_ratios=heights_mm)
+    curve = top.add_subplot()
+    panels.draw_curve(curve, run, layout.curve, layout.twin, chosen)
+    curve.set_title("(a)", loc="left", fontweight="bold", fontsize=9)
+    _draw_snapshots(middle, run, layout, profiles, camera, limits)
+    _draw_panels(bottom, run, layout, profiles)
+    middle.text(0.004, 0.995, "(b)", fontweight="bold", fontsize=9, va="top")
+    return figure
+
+
+def _draw_panels(part: SubFigure, run: Run, layout: Layout, profiles: Sequence[Profile]) -> None:
+    """Velocities over curvatures, one column per snapshot."""
+    widths = [1.0] * (len(profiles) - 1) + [1.25 if layout.with_inset else 1.0]
+    heights = [1.0, 1.6 if layout.with_inset else 1.0]
+    grid = part.add_gridspec(2, len(profiles), height_ratios=heights, width_ratios=widths)
+    rows = [[part.add_subplot(grid[row, k]) for k in range(len(profiles))] for row in (0, 1)]
+    panels.draw_profiles(rows[0], run, profiles, panels.VELOCITIES, "velocity")
+    panels.draw_profiles(rows[1], run, profiles, panels.CURVATURES, "curvature")
+    for row in rows:
+        row[0].legend(loc="best", borderpad=0.1, labelspacing=0.2, handletextpad=0.4, borderaxespad=0.2)
+    for axes in rows[0]:
+        axes.tick_params(labelbottom=False)
+    for axes in rows[1]:
+        axes.set_xlabel(style.axis_label(run.dataset["mesh_coordinate"]))
+    if layout.with_inset:
+        panels.draw_neck_inset(rows[1][-1], run, profiles[-1])
+
+
+def common_limits(
+    profiles: Sequence[Profile], camera: Camera, *, with_swim: bool, strip: float = 0.42
+) -> tuple[float, float, float, float]:
+    """(left, right, bottom, top) that hold every snapshot with its arrows, and a strip below for the keys."""
+    extents = np.array([extent(p, camera, offset_of(camera, p), with_swim=with_swim) for p in profiles])
+    half = float(np.abs(extents[:, :2]).max())
+    return -half, half, float(extents[:, 2].min()) - strip * camera.size, float(extents[:, 3].max())
+
+
+def prepare_snapshot_axes(axes: Axes, limits: tuple[float, float, float, float]) -> None:
+    """Equal scales, the common limits, no frame."""
+    axes.set_aspect("equal", adjustable="box")
+    axes.set_xlim(limits[0], limits[1])
+    axes.set_ylim(limits[2], limits[3])
+    axes.set_axis_off()
+
+
+def _draw_snapshots(
+    part: SubFigure,
+    run: Run,
+    layout: Layout,
+    profiles: Sequence[Profile],
+    camera: Camera,
+    limits: tuple[float, float, float, float],
+) -> None:
+    """The row of snapshots with their times, keys and colour bar."""
+    time = run.dataset["time"]
+    columns = len(profiles)
+    grid = part.add_gridspec(1, columns + 1, width_ratios=[1.0] * columns + [0.07])
+    row = [part.add_subplot(grid[0, k]) for k in range(columns)]
+    stamps = style.time_stamps([p.time for p in profiles], style.symbol_of(time), style.units_of(time))
+    for number, (axes, profile, stamp) in enumerate(zip(row, profiles, stamps, strict=True), start=1):
+        SnapshotArtists(axes, camera, with_swim=layout.with_swim).show(profile, offset_of(camera, profile))
+        prepare_snapshot_axes(axes, limits)
+        axes.set_title(f"$\\bf{{{number}}}$   {stamp}", pad=3)
+        if layout.with_swim:
+            label_speed(axes, run, camera, profile)
+    draw_arrow_key(row[0], run, camera, limits)
+    draw_length_key(row[1], run, camera, limits)
+    if columns > 2:
+        row[2].text(0, limits[2] + 0.16 * camera.size, "same scale in all", va="center", ha="center", fontsize=7)
+    if run.is_open:
+        draw_coat_key(row[-1])
+    elif run.regulator:
+        draw_colour_bar(part, part.add_subplot(grid[0, -1]), run, camera)
+
+
+def draw_coat_key(axes: Axes) -> None:
+    """What yellow means on an open membrane."""
+    key = [Patch(facecolor=style.COAT, edgecolor=style.INK, linewidth=0.5, label="coat")]
+    axes.legend(handles=key, loc="lower right", borderaxespad=0.0, handlelength=1.0)
+
+
+def draw_colour_bar(part: Figure | SubFigure, axes: Axes, run: Run, camera: Camera) -> Colorbar:
+    """The scale of the regulator; an arrow on top says that a small region exceeds it."""
+    bar = part.colorbar(camera.colours, cax=axes, extend="max" if camera.colours_exceed else "neither")
+    if run.regulator:
+        bar.set_label(style.axis_label(run.dataset[run.regulator], words="regulator"))
+    bar.outline.set_linewidth(0.6)
+    return bar
+
+
+def label_speed(axes: Axes, run: Run, camera: Camera, profile: Profile) -> None:
+    """The swimming speed in green beside its arrow; nothing where the arrow is too short to be drawn."""
+    if abs(profile.swim) * camera.swim_scale < camera.shortest_swim:
+        return
+    ahead = profile.axial.max() if profile.swim > 0 else profile.axial.min()
+    y = (ahead - profile.centre) * np.cos(camera.elevation) + 0.5 * camera.swim_scale * profile.swim
+    y += np.sign(profile.swim) * 0.15 * camera.size
+    text = f"{style.number(abs(profile.swim), 2)} {style.units_of(run.dataset['velocity'])}"
+    axes.text(0.14 * camera.size, y, text, color=style.GREEN, va="center", ha="left", fontsize=7)
+
+
+def draw_arrow_key(axes: Axes, run: Run, camera: Camera, limits: tuple[float, float, float, float]) -> None:
+    """A reference arrow for the flow, below the first snapshot; all snapshots share its scale."""
+    if camera.arrow_scale == 0:
+        return
+    speed = round_down(camera.longest_arrow / camera.arrow_scale)
+    y = limits[2] + 0.16 * camera.size
+    x = limits[0] + 0.06 * camera.size
+    length = speed * camera.arrow_scale
+    camera.quiver(axes, 1, style.RED, at=(x, y), vector=(length, 0.0))
+    text = f"{style.number(speed)} {style.units_of(run.dataset['tangential_velocity'])}"
+    axes.text(x + length + 0.08 * camera.size, y, text, va="center", ha="left", fontsize=7, color=style.RED)
+
+
+def draw_length_key(axes: Axes, run: Run, camera: Camera, limits: tuple[float, float, float, float]) -> None:
+    """A length bar below the second snapshot; all snapshots share its scale."""
+    length = round_down(0.7 * camera.size)
+    y = limits[2] + 0.16 * camera.size
+    x = limits[0] + 0.3 * camera.size
+    axes.add_line(Line2D([x, x + length], [y, y], color=style.INK, linewidth=1.6, solid_capstyle="butt"))
+    text = f"{style.number(length)} {style.units_of(run.dataset['radius'])}"
+    axes.text(x + length + 0.08 * camera.size, y, text, va="center", ha="left", fontsize=7)
+
+
+def round_down(value: float) -> float:
+    """The largest of 1, 2, 3, 5 times a power of ten that is not above `value` > 0."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(m for m in (5, 3, 2, 1) if m * power <= value * (1 + 1e-9)) * power)

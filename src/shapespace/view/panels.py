@@ -1,0 +1,159 @@
+"""The diagrams around the snapshots: the curve over time, and profiles of velocity and curvature over u."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.patheffects import withStroke
+from matplotlib.ticker import MaxNLocator
+
+from shapespace.view import style
+from shapespace.view.frames import Array, Profile, Run, observable
+
+GROWTH = "growth speed"  # not an observable: the normal velocity of the apex
+_OWN_SCALE_FACTOR = 4.0  # panels of one row get their own scales where their ranges differ by more
+_INSET_FACTOR = 8.0  # a peak this much above its surroundings is shown enlarged
+
+VELOCITIES = (("tangential_velocity", style.RED, "-"), ("normal_velocity", style.BLUE, (0, (4, 1.2))))
+CURVATURES = (("azimuthal_curvature", style.PURPLE, "-"), ("meridional_curvature", style.ORANGE, (0, (4, 1.2))))
+
+
+def draw_curve(axes: Axes, run: Run, name: str, twin: str | None, marked: Sequence[int]) -> None:
+    """An observable over time in blue, numbered dots at the `marked` frames, and a second series on the right axis."""
+    values = observable(run.dataset, name)
+    axes.plot(run.time, values, color=style.BLUE, zorder=3)
+    axes.plot(run.time[marked], values[marked], "o", color=style.BLUE, markersize=4, markeredgecolor="white", zorder=4)
+    axes.set_xlabel(style.axis_label(run.dataset["time"], words="time"))
+    axes.set_ylabel(style.axis_label(run.dataset[name], words=_words(run, name)), color=style.BLUE)
+    axes.tick_params(axis="y", labelcolor=style.BLUE)
+    axes.margins(x=0.015)
+    axes.margins(y=0.12)
+    _number_dots(axes, run.time, values, marked)
+    if twin is not None:
+        _draw_twin(axes, run, twin)
+
+
+def _words(run: Run, name: str) -> str:
+    return str(run.dataset[name].attrs.get("long_name", name)).replace("_", " ")
+
+
+def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int]) -> None:
+    """Numbers beside the dots, on the side away from the curve's bend: above where it is concave, else below."""
+    span = float(np.ptp(values)) or 1.0
+    width = float(time[-1] - time[0])
+    for number, k in enumerate(marked, start=1):
+        before, after = (np.interp(time[k] + side * 0.02 * width, time, values) for side in (-1, 1))
+        slope = (after - before) / span / 0.04 * 0.25  # on the page, axes about four times as wide as high
+        normal = np.array([-slope, 1.0]) / np.hypot(slope, 1.0)
+        at_end = k in (0, time.size - 1)
+        bend = 1.0 if at_end or values[k] >= 0.5 * (before + after) - 1e-3 * span else -1.0
+        if abs(slope) > 1:  # steep: always to the right
+            bend = 1.0 if normal[0] > 0 else -1.0
+        label = axes.annotate(
+            str(number),
+            (time[k], values[k]),
+            xytext=7.5 * bend * normal,
+            textcoords="offset points",
+            ha="center",
+            va="center",
+            fontweight="bold",
+            color=style.BLUE,
+            fontsize=8,
+            zorder=5,
+        )
+        label.set_path_effects([withStroke(linewidth=2, foreground="white")])
+
+
+def _draw_twin(axes: Axes, run: Run, twin: str) -> None:
+    """A second series on the right: the apex speed in red (as the flow arrows), or the swimming speed in green (as its arrow)."""
+    right = axes.twinx()
+    right.spines["right"].set_visible(True)
+    if twin == GROWTH:
+        values, colour = run.fields["normal_velocity"][:, 0], style.RED
+        text = f"growth speed ({style.units_of(run.dataset['normal_velocity'])})"
+    else:
+        values, colour = observable(run.dataset, twin), style.GREEN
+        text = style.axis_label(run.dataset[twin], words="swimming speed" if twin == "velocity" else _words(run, twin))
+    right.plot(run.time, values, color=colour, linestyle=(0, (4, 1.2)), zorder=2)
+    right.set_ylabel(text, color=colour)
+    right.tick_params(axis="y", labelcolor=colour)
+    right.margins(y=0.12)
+    axes.set_zorder(right.get_zorder() + 1)
+    axes.patch.set_visible(False)
+
+
+def draw_profiles(
+    row: Sequence[Axes], run: Run, profiles: Sequence[Profile], variables: Sequence[tuple[str, str, object]], words: str
+) -> None:
+    """One row of panels over u, one per snapshot; equal scales unless the ranges differ too much to be read."""
+    for axes, profile in zip(row, profiles, strict=True):
+        axes.axhline(0, color=style.FAINT, linewidth=0.6, zorder=1)
+        for name, colour, dashes in variables:
+            label = style.symbol_of(run.dataset[name])
+            axes.plot(profile.u, values_of(profile, name), color=colour, linestyle=dashes, linewidth=1.1, label=label)
+        axes.set_xlim(0, 1)
+        axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
+        axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
+    least = 1.0 / float(run.fields["radius"].max()) if words == "curvature" else 0.0
+    ranges = [_range(profile, variables, least) for profile in profiles]
+    common = min(low for low, _ in ranges), max(high for _, high in ranges)
+    widest, narrowest = max(h - low for low, h in ranges), min(h - low for low, h in ranges)
+    apart = words == "curvature" and widest > _OWN_SCALE_FACTOR * narrowest
+    for k, (axes, (low, high)) in enumerate(zip(row, ranges, strict=True)):
+        low, high = (low, high) if apart else common
+        pad = 0.08 * (high - low) or 1.0
+        axes.set_ylim(low - pad, high + pad)
+        axes.tick_params(labelleft=apart or k == 0)
+    row[0].set_ylabel(f"{words} ({style.units_of(run.dataset[variables[0][0]])})")
+
+
+def values_of(profile: Profile, name: str) -> Array:
+    """A field of a profile by its name in the dataset."""
+    values: dict[str, Array] = {
+        "tangential_velocity": profile.tangential,
+        "normal_velocity": profile.normal,
+        "azimuthal_curvature": profile.azimuthal_curvature,
+        "meridional_curvature": profile.meridional_curvature,
+    }
+    return values[name]
+
+
+def _range(profile: Profile, variables: Sequence[tuple[str, str, object]], least: float) -> tuple[float, float]:
+    """Lowest and highest value, zero included; at least `least` apart, so that round-off is not magnified."""
+    values = np.concatenate([[0.0], *(values_of(profile, name) for name, _, _ in variables)])
+    low, high = float(values.min()), float(values.max())
+    missing = max(0.0, least - (high - low))
+    return low - 0.5 * missing, high + 0.5 * missing
+
+
+def draw_neck_inset(axes: Axes, run: Run, profile: Profile) -> Axes | None:
+    """The meridional curvature around its peak near u = 1/2, stretched in u; None where there is no such peak."""
+    curvature, u = profile.meridional_curvature, profile.u
+    middle = np.abs(u - 0.5) < 0.15
+    peak = np.abs(np.where(middle, curvature, 0.0))
+    outside = float(np.abs(curvature[~middle]).max())
+    k = int(np.argmax(peak))
+    if peak[k] < _INSET_FACTOR * outside:
+        return None
+    around = np.abs(u - 0.5)[middle & (peak > 0.1 * peak[k])].max()
+    power = int(np.floor(np.log10(around)))
+    half = float(np.ceil(around * 10.0**-power))
+    name, colour, _ = CURVATURES[1]
+    # Same heights as in the panel around it: its y axis serves both.
+    bottom, top = (1.06 * curvature[k], 0.0) if curvature[k] < 0 else (0.0, 1.06 * curvature[k])
+    inset = axes.inset_axes((0.58, bottom, 0.42, top - bottom), transform=axes.transData)
+    inset.plot((u - 0.5) * 10.0**-power, curvature, color=colour, linewidth=1.1)
+    inset.set_xlim(-half, half)
+    inset.set_ylim(bottom, top)
+    inset.set_xticks([-half, 0, half], [style.number(-half), "0", style.number(half)])
+    inset.set_yticks([])
+    if curvature[k] < 0:
+        inset.xaxis.set_ticks_position("top")
+        inset.xaxis.set_label_position("top")
+        inset.spines["top"].set_visible(True)
+        inset.spines["bottom"].set_visible(False)
+    inset.tick_params(pad=1.0, length=2)
+    factor = f"10^{{{-power}}}\\," if power else ""
+    inset.set_xlabel(rf"${factor}(u-\frac{{1}}{{2}})$", fontsize=7, labelpad=2, x=1.0, ha="right")
+    inset.set_in_layout(False)
+    return inset
