@@ -29,12 +29,9 @@ if TYPE_CHECKING:
 
 BAD_INPUT, GAVE_UP, INTERRUPTED = 2, 3, 130
 
-_EXAMPLES = """Examples:
-  shapespace run guided-division            simulate a dividing surface; data go to results/guided-division
-  shapespace plot results/guided-division   draw it
-  shapespace config ring-slipping --out my.toml && shapespace run my.toml -s peclet=300
 
-`shapespace COMMAND --help` explains a command."""
+def _examples(*lines: str) -> str:
+    return "\n  ".join(["Examples:", *lines])
 
 
 def _version() -> str:
@@ -49,7 +46,12 @@ def _version() -> str:
 app = App(
     name="shapespace",
     help="Dynamics and stationary shapes of axisymmetric active fluid surfaces.",
-    help_epilogue=_EXAMPLES,
+    help_epilogue=_examples(
+        "shapespace run guided-division",
+        "shapespace plot results/guided-division",
+        "shapespace config ring-slipping --out my.toml",
+        "shapespace run my.toml -s peclet=300",
+    ),
     help_format="plaintext",
     version=_version,
     suppress_keyboard_interrupt=False,
@@ -59,13 +61,9 @@ app = App(
 Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run, as `shapespace run` made it.")]
 
 
-@app.command(name="scenarios")
+@app.command(name="scenarios", help_epilogue=_examples("shapespace scenarios"))
 def list_scenarios() -> None:
-    """List the built-in scenarios.
-
-    Examples:
-      shapespace scenarios
-    """
+    """List the built-in scenarios."""
     from shapespace.study.scenario import scenario_names, template
 
     for name in scenario_names():
@@ -73,18 +71,14 @@ def list_scenarios() -> None:
         print(f"{name:<22}{title}")
 
 
-@app.command
+@app.command(help_epilogue=_examples("shapespace config guided-division --out my.toml"))
 def config(
     name: Annotated[str, Parameter(help="A built-in scenario.")],
     /,
     *,
     out: Annotated[Path | None, Parameter(help="New file to write to; the default is stdout.")] = None,
 ) -> None:
-    """Write the commented TOML file of a built-in scenario, to be changed and given to `shapespace run`.
-
-    Examples:
-      shapespace config guided-division --out my.toml
-    """
+    """Write the commented TOML file of a built-in scenario, to be changed and given to `shapespace run`."""
     from shapespace.study.files import storage, write_atomically
     from shapespace.study.scenario import template
 
@@ -98,7 +92,14 @@ def config(
         write_atomically(out, text.encode())
 
 
-@app.command(name="run")
+@app.command(
+    name="run",
+    help_epilogue=_examples(
+        "shapespace run guided-division",
+        "shapespace run my.toml -s peclet=300 --until 1 --out weaker",
+        "shapespace run my.toml -s peclet=300 --until 3 --out weaker --resume",
+    ),
+)
 def run_command(
     scenario: Annotated[str, Parameter(name="NAME_OR_FILE", help="A built-in scenario or a TOML file.")],
     /,
@@ -113,13 +114,7 @@ def run_command(
     resume: Annotated[bool, Parameter(help="Continue the run in DIR, or start it where there is none yet.")] = False,
     as_json: Annotated[bool, Parameter(name="--json", help="End with one line of JSON on stdout.")] = False,
 ) -> int:
-    """Simulate a scenario; every time step is stored, so that a run can be stopped at any moment and resumed.
-
-    Examples:
-      shapespace run guided-division
-      shapespace run my.toml -s peclet=300 -s elements=80 --until 1 --out results/weaker
-      shapespace run my.toml -s peclet=300 -s elements=80 --until 3 --out results/weaker --resume
-    """
+    """Simulate a scenario; every time step is stored, so that a run can be stopped at any moment and resumed."""
     from shapespace.study.run import free_path, run
     from shapespace.study.store import holds_run
 
@@ -145,19 +140,18 @@ def run_command(
     return GAVE_UP
 
 
-@app.command
+@app.command(
+    help_epilogue=_examples(
+        "shapespace plot results/guided-division", "shapespace plot results/guided-division --out division.pdf"
+    )
+)
 def plot(
     store: Store,
     /,
     *,
     out: Annotated[Path | None, Parameter(metavar="FILE", help="Picture file; the default is DIR/figure.png.")] = None,
 ) -> None:
-    """Draw a stored run: a curve over time, snapshots of the surface, profiles of velocity and curvature.
-
-    Examples:
-      shapespace plot results/guided-division
-      shapespace plot results/guided-division --out division.pdf
-    """
+    """Draw a stored run: a curve over time, snapshots of the surface, profiles of velocity and curvature."""
     from shapespace.study.dataset import open_dataset
     from shapespace.study.files import replacing
     from shapespace.view.figure import plot_run
@@ -171,19 +165,18 @@ def plot(
     print(target)
 
 
-@app.command
+@app.command(
+    help_epilogue=_examples(
+        "shapespace movie results/guided-division", "shapespace movie results/guided-division --out division.gif"
+    )
+)
 def movie(
     store: Store,
     /,
     *,
     out: Annotated[Path | None, Parameter(metavar="FILE", help="Movie file; the default is DIR/movie.mp4.")] = None,
 ) -> None:
-    """Make a movie of a stored run, as .mp4 or .gif; a gif where there is no ffmpeg.
-
-    Examples:
-      shapespace movie results/guided-division
-      shapespace movie results/guided-division --out division.gif
-    """
+    """Make a movie of a stored run, as .mp4 or .gif; a gif where there is no ffmpeg."""
     from rich.console import Console
     from rich.progress import Progress
 
@@ -200,17 +193,13 @@ def movie(
     print(written)
 
 
-@app.command
+@app.command(help_epilogue=_examples("shapespace export results/guided-division division.nc"))
 def export(
     store: Store,
     file: Annotated[Path, Parameter(name="FILE", help="NetCDF file, ending in .nc.")],
     /,
 ) -> None:
-    """Write a stored run as one self-describing NetCDF file, readable by xarray, Python, Julia, MATLAB.
-
-    Examples:
-      shapespace export results/guided-division division.nc
-    """
+    """Write a stored run as one self-describing NetCDF file, readable by xarray, Python, Julia, MATLAB."""
     from shapespace.study.dataset import open_dataset
     from shapespace.study.files import replacing
 
@@ -222,13 +211,9 @@ def export(
     print(file)
 
 
-@app.command
+@app.command(help_epilogue=_examples("shapespace check"))
 def check() -> int:
-    """Check this installation: versions, double precision, a small solve, writing here, a movie writer.
-
-    Examples:
-      shapespace check
-    """
+    """Check this installation: versions, double precision, a small solve, writing here, a movie writer."""
     from shapespace.study.check import probe_precision, probe_solve, probe_versions, probe_writing
 
     probes = {

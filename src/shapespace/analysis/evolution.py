@@ -16,19 +16,23 @@ ROUND_OFF_FACTOR = 1e3
 """How much a linear solve amplifies round-off, generously; matters only for steps below 1e-5."""
 
 
+START_LIMIT = 4.0**7
+"""How much longer than asked the first step may be where Newton needs it."""
+
+
 @dataclass(frozen=True)
 class Stepping:
     """Options of time stepping.
 
     order: 1 is backward Euler, 2 the default. fixed_step: 0 for error control at `tolerance` (local error of the stored
-    quantities per step, relative), else the step length. first_step: where error control starts. min_step: below it the
+    quantities per step, relative), else the step length. first_step: the first, which no estimate can control. min_step: below it the
     run ends in step-underflow. stationary_rate: largest relative rate of change of a state that counts as stationary.
     """
 
     order: int = 2
     fixed_step: float = 0.0
     tolerance: float = 1e-4
-    first_step: float = 1e-7
+    first_step: float = 1e-6
     min_step: float = 1e-12
     max_growth: float = 2.0
     stationary_rate: float = 1e-6
@@ -107,7 +111,10 @@ class Evolution:
         while step >= options.min_step:
             trial, proposed = self._within(step), step
             order = min(options.order, len(self._times))
-            root, rate = self._solve(problem, trial, order)
+            if len(self._times) == 1 and not options.fixed_step:
+                trial, root, rate = self._start(problem, trial)
+            else:
+                root, rate = self._solve(problem, trial, order)
             if root.outcome is not Outcome.CONVERGED:
                 if options.fixed_step:
                     break
@@ -115,7 +122,7 @@ class Evolution:
                 continue
             stored = problem.stored(root.x, self.p)
             factor = 1.0
-            if not options.fixed_step:
+            if len(self._times) > 1 and not options.fixed_step:
                 error = self._local_error(problem, trial, order, stored) / options.tolerance
                 factor = float(np.clip(0.85 * max(error, 1e-10) ** (-1.0 / (order + 1)), 0.2, options.max_growth))
                 if error > 1.0:
@@ -130,6 +137,23 @@ class Evolution:
         self.outcome = Outcome.STEP_UNDERFLOW
         return None
 
+    def _start(self, problem: AbstractProblem, step: float) -> tuple[float, Root, Rate]:
+        """The first step, which may leave a singular state: a flat disc buckles as the root of time.
+
+        Newton then fails at small steps from that state, but not at larger ones, from which smaller ones are reached.
+        """
+        root, rate = self._solve(problem, step, 1)
+        larger = step
+        while root.outcome is not Outcome.CONVERGED and larger < START_LIMIT * step:
+            larger *= 4.0
+            root, rate = self._solve(problem, larger, 1)
+        while root.outcome is Outcome.CONVERGED and larger > step:
+            smaller, smaller_rate = self._solve(problem, 0.25 * larger, 1, root.x)
+            if smaller.outcome is not Outcome.CONVERGED:
+                break
+            larger, root, rate = 0.25 * larger, smaller, smaller_rate
+        return larger, root, rate
+
     def _within(self, step: float) -> float:
         """The step, shortened to land on `until`, or halved where it would leave a sliver before it."""
         left = self.until - self._times[0]
@@ -137,15 +161,18 @@ class Evolution:
             return left
         return 0.5 * left if not self.stepping.fixed_step and step > 0.6 * left else step
 
-    def _solve(self, problem: AbstractProblem, step: float, order: int) -> tuple[Root, Rate]:
-        """Solve one backward-differentiation step from the extrapolated guess."""
+    def _solve(
+        self, problem: AbstractProblem, step: float, order: int, guess: Array | None = None
+    ) -> tuple[Root, Rate]:
+        """Solve one backward-differentiation step, from the extrapolated guess unless another is given."""
         time = self._times[0] + step
         weights = derivative_weights(np.array([time, *self._times[:order]]))
         history = sum((w * q for w, q in zip(weights[1:], self._stored, strict=False)), np.zeros_like(self._stored[0]))
         rate = Rate(float(weights[0]), history)
         points = min(order + 1, len(self._times))
         extrapolation = extrapolation_weights(time, np.array(self._times[:points]))
-        guess = sum((w * x for w, x in zip(extrapolation, self._states, strict=False)), np.zeros_like(self._states[0]))
+        if guess is None:
+            guess = sum((w * x for w, x in zip(extrapolation, self._states, strict=False)), 0.0 * self._states[0])
         known = None
         if self._linearisation is not None and abs(self._linearisation[1] / rate.coefficient - 1.0) < 0.2:
             known = self._linearisation[0]
@@ -163,12 +190,12 @@ class Evolution:
         return replace(self.newton, tolerance=min(max(self.newton.tolerance, floor), 1e-3))
 
     def _local_error(self, problem: AbstractProblem, step: float, order: int, stored: Array) -> float:
-        """Estimated local error of the stored quantities; with no earlier moment the whole change counts."""
+        """Estimated local error of the stored quantities, from the predictor through as many moments as there are."""
         order = min(order, len(self._times) - 1)
         time = self._times[0] + step
         weights = extrapolation_weights(time, np.array(self._times[: order + 1]))
         predicted = sum((w * q for w, q in zip(weights, self._stored, strict=False)), np.zeros_like(stored))
-        factor = error_factor(time, np.array(self._times), order) if order > 0 else 1.0
+        factor = error_factor(time, np.array(self._times), order)
         return factor * problem.stored_norm(stored - predicted, stored)
 
     def _remember(self, moment: Moment, stored: Array) -> None:
