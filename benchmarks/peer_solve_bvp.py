@@ -1,13 +1,14 @@
 """The paper's route as a peer: guided division (Fig. 6) by backward Euler with `scipy.integrate.solve_bvp`.
 
-Every time step is one boundary value problem in the mesh coordinate u, written by hand as an explicit first-order system
-for eleven fields (order of `FIELDS`) and two scalars (meridian length h, pressure p). With the rates
+Every time step is one boundary value problem in the mesh coordinate u, written by hand as an explicit first-order
+system for eleven fields (order of `FIELDS`) and two scalars (meridian length h, pressure p). With the rates
 
     r_t = (r - r_old)/dt,  z_t = (z - z_old)/dt,  c_t = (c - c_old)/dt,
     v_n = sin(psi) r_t + cos(psi) z_t,   q^u = [v_u + sin(psi) z_t - cos(psi) r_t]/h,
 
 the curvatures C_phi = sin(psi)/r and C_u = psi'/h = m/(kappa r) - C_phi, the strain rates S_u = v_u'/h + C_u v_n and
-S_phi = (cos(psi) v_u + sin(psi) v_n)/r, and the tensions T = gamma + xi f(c) + eta_b (S_u + S_phi) +- eta_s (S_u - S_phi),
+S_phi = (cos(psi) v_u + sin(psi) v_n)/r, and T = gamma + (xi dmu)_0 f(c) + eta_b (S_u + S_phi) +- eta_s (S_u - S_phi)
+(+ for T_u, - for T_phi), f(c) = c^2/(c^2 + c_s^2),
 
     r' = h cos(psi)        z' = -h sin(psi)        psi' = h C_u
     m' = h (m cos(psi)/r + alpha sin(psi) + beta cos(psi))                             bending moment times r
@@ -82,7 +83,7 @@ class Parameters:
 class Ends:
     """How the poles are cut out: solve_bvp puts nodes on the ends, where the equations divide by r.
 
-    regular=False: the usual hole. u runs from 0 to 1, r = `hole`, psi = arcsin(hole) (the cap of the unit sphere), v_u = 0.
+    regular=False: the usual hole. u runs from 0 to 1, r = `hole`, psi = arcsin(hole) (the unit sphere's cap), v_u = 0.
     regular=True: the pole's first-order expansion. u runs from d = hole/pi to 1 - d with r = h d, C_u = C_phi and
     T_u = T_phi, as on every smooth surface to O(hole^2): no boundary layer at the hole, no stretch of u.
     """
@@ -331,13 +332,13 @@ def march(n_steps: int, dt: float = TIME_STEP, tol: float = 1e-3, peer: Peer = T
 
 
 def passive_decay_rate(peer: Peer = TUNED, dt: float = TIME_STEP, tol: float = 1e-6, amplitude: float = 1e-3) -> float:
-    """Rate of the l = 2 mode of the passive sphere, backward Euler undone; exact: -37.00489 (gamma = 9, Gamma = 0.09)."""
+    """Rate of the l = 2 mode of the passive sphere, backward Euler undone; exact: -37.00489 (gamma 9, Gamma 0.09)."""
     passive = replace(peer, parameters=replace(peer.parameters, active_tension=0.0, ring_amplitude=0.0))
-    radii = []
+    radii: list[Array] = []
     for sign in (1.0, -1.0):  # the difference of the two leaves out the even orders and the hole
         first = backward_euler_step(sphere_start(passive, sign * amplitude), dt, tol, passive)
-        radii.append((first.neck_radius, backward_euler_step(first, dt, tol, passive).neck_radius))
-    before, after = np.subtract(*radii)
+        radii.append(np.array([first.neck_radius, backward_euler_step(first, dt, tol, passive).neck_radius]))
+    before, after = radii[0] - radii[1]
     return float((1.0 - before / after) / dt)
 
 
@@ -366,10 +367,8 @@ def print_run(n_steps: int, tol: float, peer: Peer) -> None:
                 flush=True,
             )
     seconds, cpu, nodes = np.array(results).T
-    print(
-        f"  {len(results)} steps in {seconds.sum():.1f} s ({cpu.sum():.1f} s of processor time); per step: mean "
-        f"{seconds.mean():.4f} s, median {np.median(seconds):.4f} s, worst {seconds.max():.3f} s; up to {nodes.max():.0f} nodes"
-    )
+    print(f"  {len(results)} steps in {seconds.sum():.1f} s ({cpu.sum():.1f} s of CPU), <= {nodes.max():.0f} nodes;")
+    print(f"  per step: mean {seconds.mean():.4f} s, median {np.median(seconds):.4f} s, worst {seconds.max():.3f} s")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

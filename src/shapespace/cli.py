@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from shapespace.study.frame import Frame
-    from shapespace.study.pace import Pace
     from shapespace.study.run import Run
     from shapespace.study.scenario import Scenario
 
@@ -116,18 +115,13 @@ def run_command(
 ) -> int:
     """Simulate a scenario; every time step is stored, so that a run can be stopped at any moment and resumed."""
     from shapespace.study.run import free_path, run
-    from shapespace.study.store import holds_run
 
     changes = _read_settings([*settings, *(f"{k}={v}" for k, v in (("until", until), ("dt", dt)) if v is not None)])
     chosen = _find_scenario(scenario).with_overrides(changes)
     path = out or (Path("results") / chosen.name if resume else free_path(chosen.name))
-    continues = resume and holds_run(path)
-    if resume and not continues:
-        _tell(f"{path}: holds no run yet; starting one.")
     try:
-        title = f"{'continuing' if continues else 'running'} {chosen.name} in {path}"
-        with ProgressDisplay(chosen.run.until, title) as display:
-            result = run(chosen, out=path, resume=resume, progress=display.update)
+        with ProgressDisplay(chosen.run.until, f"{chosen.name} in {path}") as display:
+            result = run(chosen, out=path, resume=resume, progress=display.update, ready=display.start)
     except KeyboardInterrupt:
         options = [word for key, value in changes.items() for word in ("-s", f"{key}={value}")]
         words = ["shapespace", "run", scenario, *options, "--out", str(path), "--resume"]
@@ -259,28 +253,30 @@ class ProgressDisplay:
     """Where a run stands, on stderr: a bar with an ETA on a terminal, else a plain line now and then."""
 
     def __init__(self, until: float, title: str, seconds_between_lines: float = 5.0) -> None:
+        from shapespace.study.pace import Pace
+
         self._until = until
         self._title = title
         self._pause = seconds_between_lines
-        self._pace: Pace | None = None
+        self._pace = Pace(until)
         self._bar: Progress | None = None
         self._told = -math.inf
 
     def __enter__(self) -> Self:
+        return self
+
+    def start(self, frames: int) -> None:
+        """Appear: the input was good, and the store has so many frames already."""
         from rich.console import Console
         from rich.progress import BarColumn, Progress, TextColumn
 
-        from shapespace.study.pace import Pace
-
-        self._pace = Pace(self._until)
+        _tell(f"continuing {self._title} after {frames} frames" if frames else f"starting {self._title}")
         console = Console(stderr=True)
         if console.is_terminal:
             columns = [TextColumn("{task.percentage:>3.0f} %"), BarColumn(20), TextColumn("{task.description}")]
             self._bar = Progress(*columns, console=console, transient=True)
             self._bar.add_task("preparing ...", total=self._until)
             self._bar.start()
-        _tell(self._title)
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -290,8 +286,6 @@ class ProgressDisplay:
 
     def update(self, frame: "Frame", steps: int) -> None:
         """Take note of a new frame."""
-        if self._pace is None:
-            return
         text = self._pace.describe(frame, steps)
         if self._bar is not None:
             task = self._bar.task_ids[0]

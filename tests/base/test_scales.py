@@ -93,7 +93,7 @@ def test_a_scale_must_be_positive_and_finite(length: float):
 
 @pytest.mark.parametrize("length", [1e-200, 1e200])
 def test_units_out_of_range_are_named(length: float):
-    with pytest.raises(InputError, match="friction: .*choose units"):
+    with pytest.raises(InputError, match=r"friction: .*choose units"):
         Scales(length, 1.0, 1.0).to_dimensionless({"friction": 1.0})
-    with pytest.raises(InputError, match="until = 1e\\+300"):
+    with pytest.raises(InputError, match=r"until = 1e\+300"):
         Scales(1.0, 1.0, 1e-300).to_dimensionless({"until": 1e300})

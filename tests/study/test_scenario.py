@@ -55,7 +55,14 @@ def test_template_states_every_key_with_symbol_and_unit(name: str):
 def test_template_opens_as_a_short_paper(name: str):
     head = template(name).partition("\nname = ")[0]
     assert all(line.startswith("#") for line in head.strip().splitlines())
-    for heading in ("Fig. ", "Model.", "Units.", "Assumed where the paper is silent.", "Expect.", "Run: shapespace run"):
+    for heading in (
+        "Fig. ",
+        "Model.",
+        "Units.",
+        "Assumed where the paper is silent.",
+        "Expect.",
+        "Run: shapespace run",
+    ):
         assert heading in head
     assert max(map(len, template(name).splitlines())) <= 120
 
@@ -219,7 +226,7 @@ def test_unknown_scenario_names_the_nearest():
 def test_records_made_by_hand_are_checked_in_one_line_too():
     with pytest.raises(InputError, match=r"^elements = 7: must be one of"):
         Numerics(elements=7)
-    with pytest.raises(InputError, match="^bending_rigidity: is missing"):
+    with pytest.raises(InputError, match=r"^bending_rigidity: is missing"):
         ClosedSurfaceParameters()
 
 
@@ -265,7 +272,7 @@ def test_template_file_loads_as_the_scenario(file: Path):
         ("tension = 9.0", "tension = 9.0\ntension = 8.0", "line"),
         ("tension = 9.0", "tenson = 9.0", "nearest valid one is tension"),
         ("tension = 9.0", "", "tension: is missing from [parameters]"),
-        ("peclet = 450.0", "", "active_tension: is missing"),
+        ("peclet = 450.0", "", "active_tension (or peclet): is missing"),
         ("peclet = 450.0", "peclet = 450.0\nactive_tension = 1.0", "give only one"),
         ("degree = 4", "degree = 4.0", "must be a whole number"),
         ("degree = 4", "until = 4", "stands in [numerics]; move it under [run]"),

@@ -1,7 +1,7 @@
 """Made-up runs that look like the four scenarios: right geometry and kinematics, no mechanics.
 
-Each shape is a closed-form curve x -> (r, z) at every time. Angles and curvatures come from differences on a fine grid, the
-normal velocity from the motion of the curve; tangential flow and regulator are invented.
+Each shape is a closed-form curve x -> (r, z) at every time. Angles and curvatures come from differences on a fine grid,
+the normal velocity from the motion of the curve; tangential flow and regulator are invented.
 """
 
 import json
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Curve = Callable[[float], tuple[Array, Array]]  # time -> fine (r, z), from the top pole down
 
-FINE = 24001  # fine grid points; a multiple of POINTS - 1, plus 1
+FINE = 7201  # fine grid points; a multiple of POINTS - 1, plus 1
 POINTS = 241
 STEP = 1e-4  # of the central difference in time
 
@@ -198,7 +198,9 @@ def membrane_protrusion(frames: int = 70, tall: float = 0.7) -> xr.Dataset:
         fields, length = _geometry(curve, float(time))
         s, radius = fields["mesh_coordinate"] * length, fields["radius"]
         area = np.concatenate([[0.0], np.cumsum(np.diff(s) * 0.5 * (radius[1:] + radius[:-1]))])
-        fields["tangential_velocity"] = -np.max(fields["normal_velocity"]) * radius * np.exp(-((radius / 0.6) ** 2)) * 1.4
+        fields["tangential_velocity"] = (
+            -np.max(fields["normal_velocity"]) * radius * np.exp(-((radius / 0.6) ** 2)) * 1.4
+        )
         fields["local_spontaneous_curvature"] = 4.5 * (1 - np.tanh(25 * (area - 0.08)))
         fields["local_tension"] = 12.5 + 0 * area
         made.append(Frame(fields, {"height": float(fields["axial_position"][0] - fields["axial_position"][-1])}))

@@ -2,10 +2,9 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -52,14 +51,14 @@ def _arguments(nodes: Traced, slopes: Traced, algebraic: Traced, scalars: Traced
     return jnp.concatenate([*flat, spread], axis=1), jnp.concatenate([nodes[0], nodes[-1], scalars])
 
 
-@eqx.filter_jit
+@partial(jax.jit, static_argnums=0)
 def _residual(system: AbstractSystem, parts: Any, history: Any, coefficient: Traced, p: Traced) -> tuple[Traced, ...]:
     points, ends, widths, stage_u = _points(parts)
     rows = jax.vmap(lambda v, q, u: _point_rows(system, v, q, coefficient, u, p))(points, history[0], stage_u)
     return rows, _end_rows(system, ends, history[1], coefficient, p), system.targets(parts[4], p)
 
 
-@eqx.filter_jit
+@partial(jax.jit, static_argnums=0)
 def _linearised(system: AbstractSystem, parts: Any, history: Any, coefficient: Traced, p: Traced) -> tuple[Traced, ...]:
     points, ends, widths, stage_u = _points(parts)
 
@@ -67,7 +66,9 @@ def _linearised(system: AbstractSystem, parts: Any, history: Any, coefficient: T
         value = _point_rows(system, v, q, coefficient, u, p)
         return value, value
 
-    jacobian, value = jax.vmap(jax.jacfwd(rows, has_aux=True))(points, history[0], stage_u)
+    # Points run along the last axis, in the order (stage, element), which is what the elimination vectorises over.
+    jacobian, value = jax.vmap(jax.jacfwd(rows, has_aux=True), out_axes=(-1, 0))(points, history[0], stage_u)
+    jacobian = jacobian.reshape(*jacobian.shape[:2], *parts[2].shape[:2]).swapaxes(2, 3)
     end_jacobian = jax.jacfwd(lambda v: _end_rows(system, v, history[1], coefficient, p))(ends)
     end_value = _end_rows(system, ends, history[1], coefficient, p)
     target_jacobian = jax.jacfwd(lambda s: system.targets(s, p))(parts[4])
@@ -82,7 +83,7 @@ def _points(parts: Any) -> tuple[Traced, Traced, Traced, Traced]:
     return points, ends, widths, stage_u.ravel()
 
 
-@eqx.filter_jit
+@partial(jax.jit, static_argnums=(0, 1))
 def _integrals(
     system: AbstractSystem, density: Callable[..., dict[str, Traced]], parts: Any, history: Any, c: Traced, p: Traced
 ) -> tuple[dict[str, Traced], dict[str, Traced]]:
@@ -99,7 +100,7 @@ def _integrals(
     return {name: weights @ x for name, x in values.items()}, {name: x.max() for name, x in values.items()}
 
 
-@eqx.filter_jit
+@partial(jax.jit, static_argnums=0)
 def _stored(system: AbstractSystem, parts: Any) -> Traced:
     points, ends, _, _ = _points(parts)
     n, n_a = len(system.fields), len(system.algebraic)
@@ -125,12 +126,14 @@ class CollocationLinearisation(AbstractLinearisation):
         problem = self.problem
         n_stage = problem.elements * problem.degree * problem.n_rows
         n_chain = problem.elements * problem.n
+        stage_rows = residual[:n_stage].reshape(problem.elements, problem.degree, problem.n_rows)
         rhs = condensation.Update(
             residual[n_stage : n_stage + n_chain].reshape(problem.elements, problem.n),
-            residual[:n_stage].reshape(problem.elements, problem.degree, problem.n_rows),
+            np.ascontiguousarray(stage_rows.transpose(1, 2, 0)),
             residual[n_stage + n_chain :],
         )
-        nodes, stages, scalars = condensation.solve(self.factors, rhs, problem.n_integrals)
+        nodes, stages, scalars = condensation.solve(self.factors, rhs)
+        stages = stages.transpose(2, 0, 1)
         return np.concatenate(
             [nodes.ravel(), stages[..., : problem.n].ravel(), stages[..., problem.n :].ravel(), scalars]
         )
@@ -174,11 +177,11 @@ class CollocationProblem(AbstractProblem):
     def unpack(self, x: Array) -> State:
         """The state of x (size,)."""
         elements, k, n, n_a = self.elements, self.degree, self.n, len(self.system.algebraic)
-        cuts = np.cumsum([(elements + 1) * n, elements * k * n, elements * k * n_a])
-        nodes, slopes, algebraic, scalars = np.split(x, cuts)
-        return State(
-            self.mesh, nodes.reshape(-1, n), slopes.reshape(elements, k, n), algebraic.reshape(elements, k, n_a), scalars
-        )
+        a = (elements + 1) * n
+        b = a + elements * k * n
+        c = b + elements * k * n_a
+        nodes, slopes = x[:a].reshape(-1, n), x[a:b].reshape(elements, k, n)
+        return State(self.mesh, nodes, slopes, x[b:c].reshape(elements, k, n_a), x[c:])
 
     def _parts(self, state: State) -> tuple[Array, ...]:
         return state.mesh, state.nodes, state.slopes, state.algebraic, state.scalars
@@ -191,9 +194,9 @@ class CollocationProblem(AbstractProblem):
     def _flat_residual(self, state: State, rows: Array, ends: Array, targets: Array) -> Array:
         rule = gauss_rule(self.degree)
         rows = rows.reshape(self.elements, self.degree, -1)
-        increments = self._widths[:, None] * np.einsum("l,eln->en", rule.weights, state.slopes)
-        continuity = np.diff(state.nodes, axis=0) - increments
-        integrals = np.einsum("e,j,ejq->q", self._widths, rule.weights, rows[..., self.n_rows :]) - targets
+        increments = self._widths[:, None] * np.matmul(rule.weights, state.slopes)
+        continuity = state.nodes[1:] - state.nodes[:-1] - increments
+        integrals = self._widths @ np.matmul(rule.weights, rows[..., self.n_rows :]) - targets
         return np.concatenate([rows[..., : self.n_rows].ravel(), continuity.ravel(), ends, integrals])
 
     def residual(self, x: Array, p: Array, rate: Rate) -> Array:
@@ -209,8 +212,7 @@ class CollocationProblem(AbstractProblem):
         rows, ends, targets, jacobian, end_jacobian, target_jacobian = (np.asarray(part) for part in out)
         rule = gauss_rule(self.degree)
         factors = condensation.factorise(
-            self._widths, rule.matrix, rule.weights, jacobian.reshape(self.elements, self.degree, *jacobian.shape[1:]),
-            end_jacobian, target_jacobian, self.n,
+            self._widths, rule.matrix, rule.weights, jacobian, end_jacobian, target_jacobian, self.n
         )  # fmt: skip
         return self._flat_residual(state, rows, ends, targets), CollocationLinearisation(self, factors)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from shapespace.base.errors import InputError, StoreError
+from shapespace.base.errors import StoreError
 
 _NOT_WRITABLE = {errno.EACCES, errno.EPERM, errno.EROFS}
 _NO_LOCKS = {errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOLCK}
@@ -27,10 +27,6 @@ def storage(path: Path, then: str = "nothing was written: then run again") -> It
                 f"{path}: permission is missing ({reason}); change it, or choose another --out."
             ) from error
         raise StoreError(f"{path}: cannot be read or written ({reason}); choose another directory.") from error
-    except ValueError as error:
-        if isinstance(error, InputError) or "null" not in str(error):
-            raise
-        raise StoreError(f"{str(path)!r}: is no path ({error}); choose another --out.") from error
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -74,6 +70,8 @@ def acquire_lock(path: Path) -> int:
         # File systems of some clusters have no locks; there the rule of one writer is the user's to keep.
         if error.errno not in _NO_LOCKS:
             os.close(lock)
+            with suppress(OSError):
+                path.unlink()
             raise
     return lock
 

@@ -1,5 +1,6 @@
 """How a running simulation gets on: one line of text with the state and an estimate of the time left."""
 
+import math
 from collections import deque
 from time import monotonic
 
@@ -7,6 +8,9 @@ from shapespace.study.frame import Frame
 
 # The radius that tells most, then the height.
 _RADII = ("neck_radius", "equator_radius")
+
+# An estimate beyond this many seconds comes from the first tiny steps and says nothing.
+_LONGEST = 24 * 3600
 
 
 class Pace:
@@ -25,7 +29,10 @@ class Pace:
         return ", ".join([*parts, *(f"{name} {values[name]:.4g}" for name in names), self._eta()])
 
     def _eta(self) -> str:
-        (begin, first), (now, time) = self._marks[0], self._marks[-1]
-        if time <= first:
+        # The oldest mark is left out: before the second frame there was compilation.
+        (begin, first), (now, time) = self._marks[min(1, len(self._marks) - 1)], self._marks[-1]
+        seconds = max(0.0, self.until - time) * (now - begin) / (time - first) if time > first else math.inf
+        if seconds > _LONGEST:
             return "ETA unknown"
-        return f"ETA {max(0.0, self.until - time) * (now - begin) / (time - first):.0f} s"
+        minutes, seconds = divmod(round(seconds), 60)
+        return f"ETA {minutes} min {seconds} s" if minutes else f"ETA {seconds} s"

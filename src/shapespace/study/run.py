@@ -52,13 +52,19 @@ class Run:
 
 
 def run(
-    scenario: Scenario, *, out: str | Path | None = None, resume: bool = False, progress: Progress | None = None
+    scenario: Scenario,
+    *,
+    out: str | Path | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+    ready: Callable[[int], None] | None = None,
 ) -> Run:
     """Simulate a scenario to its end and return the Run; its outcome says whether the solver gave up.
 
     `out` is the directory of the store, new or empty; without it the frames are kept in memory. With `resume` a store
     in `out` is continued; one that has already ended as asked is left as it is. InputError and StoreError before
-    anything is computed; StoreError when the disk fills up, with all frames so far intact.
+    anything is computed; StoreError when the disk fills up, with all frames so far intact. `ready` is called once when
+    the store is, with the number of its frames; `progress` after each new frame.
     """
     start = perf_counter()
     if out is None:
@@ -69,8 +75,10 @@ def run(
         return Run(
             outcome, scenario, None, frames[-1].observables, len(frames) - 1, perf_counter() - start, tuple(frames)
         )
-    continues = resume and holds_run(out)
-    with RunStore.resume(out, scenario) if continues else RunStore.create(out, scenario) as store:
+    begin = RunStore.resume if resume and holds_run(out) else RunStore.create
+    with begin(out, scenario) as store:
+        if ready is not None:
+            ready(len(store))
         outcome = _advance(store, progress)
         last = store.read(-1)
         return Run(outcome, store.scenario, store.path, last.observables, len(store) - 1, perf_counter() - start)

@@ -59,11 +59,14 @@ class Scenario(Record):
         given = replace_keys({}, keys, model)
         sections = MODELS[model].sections
         by_section: dict[str, dict[str, Value]] = {section: {} for section in sections}
-        for key, value in given.items():
-            by_section[MODELS[model].section_of[key]][key] = value
+        for key, section in MODELS[model].section_of.items():
+            if key in given:
+                by_section[section][key] = given[key]
         records: dict[str, Any] = {section: sections[section](**by_section[section]) for section in _SECTIONS[1:]}
         records["parameters"] = make_parameters(by_section["parameters"], model)
-        made = cls(name=name, model=model, given=tuple(given.items()), **records)
+        # In the order of the records, so that equal scenarios compare equal however they came about.
+        ordered = tuple((key, given[key]) for key in MODELS[model].section_of if key in given)
+        made = cls(name=name, model=model, given=ordered, **records)
         made.dimensionless()
         made.twins()
         return made
@@ -188,10 +191,10 @@ def _from_text(text: str) -> Scenario:
         keys |= entries
     known = MODELS[model]
     for key, section in known.section_of.items():
-        if key not in known.twins and key not in keys and known.rival_of(key) not in keys:
-            raise InputError(
-                f"{key}: is missing from [{section}]; the file is cut short or incomplete: add {key} = ...."
-            )
+        rival = known.rival_of(key)
+        if key not in known.twins and key not in keys and rival not in keys:
+            either = f"{key} (or {rival})" if rival else key
+            raise InputError(f"{either}: is missing from [{section}]; the file is cut short or incomplete: add it.")
     return Scenario.from_keys(name, model, keys)
 
 

@@ -174,6 +174,16 @@ class RunStore:
         return Outcome(self._manifest["outcome"]) if self._manifest["outcome"] else None
 
     @property
+    def created(self) -> str:
+        """When the run was started, as ISO text."""
+        return str(self._manifest["created"])
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """The versions of Python and packages that started the run."""
+        return dict(self._manifest["versions"])
+
+    @property
     def manifest(self) -> dict[str, Any]:
         """A copy of what `store.json` holds."""
         return json.loads(json.dumps(self._manifest))
@@ -213,11 +223,12 @@ def holds_run(path: str | Path) -> bool:
 
 
 def is_free(path: str | Path) -> bool:
-    """Whether a new run can be created in this directory."""
-    try:
-        _check_free(Path(path))
-    except StoreError:
-        return False
+    """Whether a new run can be created in this directory; StoreError where that cannot be found out."""
+    with storage(Path(path)):
+        try:
+            _check_free(Path(path))
+        except StoreError:
+            return False
     return True
 
 
@@ -228,6 +239,8 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
 
 def _check_free(path: Path) -> None:
     """StoreError unless the path is free for a new run: absent, empty, or left by a creation that was killed."""
+    if "\0" in str(path):
+        raise StoreError(f"{str(path)!r}: is no path; choose another --out.")
     if not path.exists() and not path.is_symlink():
         return
     if not path.is_dir():
@@ -306,7 +319,7 @@ def _read_manifest(path: Path) -> dict[str, Any]:
             f"{file}: has format_version {manifest.get('format_version')}, this shapespace reads {FORMAT_VERSION}; "
             "use the shapespace that wrote it."
         )
-    missing = {"scenario", "outcome", "frames", "resumed", "status"} - manifest.keys()
+    missing = {"created", "versions", "scenario", "outcome", "frames", "resumed", "status"} - manifest.keys()
     if missing:
         raise StoreError(f"{file}: is damaged (no {min(missing)}); restore it, or run again with another --out.")
     if not isinstance(manifest["frames"], int | None) or manifest["outcome"] not in {None, *Outcome}:

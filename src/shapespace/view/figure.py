@@ -1,4 +1,4 @@
-"""The figure of a run: a curve over time, snapshots of the surface, and profiles of velocity and curvature below them."""
+"""The figure of a run: a curve over time, snapshots of the surface, profiles of velocity and curvature below them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,13 +10,14 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Rectangle
 
 from shapespace.view import panels, style
 from shapespace.view.frames import Profile, Run, observable, progress_measure, read_run, snapshot_frames
-from shapespace.view.snapshot import Camera, SnapshotArtists, extent, make_camera, offset_of
+from shapespace.view.snapshot import Camera, SnapshotArtists, arrow_flows, extent, fastest_flow, make_camera, offset_of
 
 SNAPSHOTS = 5
+Limits = tuple[float, float, float, float]  # left, right, bottom, top
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class Layout:
     """What the figure of one scenario shows: the observable of the curve, a second one, and extras of the snapshots."""
 
     curve: str
+    words: str = ""
     twin: str | None = None
     with_swim: bool = False
     with_inset: bool = False
@@ -35,10 +37,10 @@ class Layout:
 
 
 _LAYOUTS = {
-    "membrane-protrusion": Layout("height", panels.GROWTH),
-    "ring-slipping": Layout("ring_position", "velocity", with_swim=True),
-    "polar-swimmer": Layout("ring_position", "velocity", with_swim=True),
-    "guided-division": Layout("equator_radius", with_inset=True),
+    "membrane-protrusion": Layout("height", twin=panels.GROWTH),
+    "ring-slipping": Layout("ring_position", twin="velocity", with_swim=True),
+    "polar-swimmer": Layout("ring_position", twin="velocity", with_swim=True),
+    "guided-division": Layout("equator_radius", words="neck radius", with_inset=True),
 }
 _GENERIC_CURVES = ("equator_radius", "height", "neck_radius", "ring_position", "length", "area", "velocity")
 
@@ -51,40 +53,50 @@ def layout_of(dataset: xr.Dataset) -> Layout:
     if dataset.attrs.get("model") == "open-membrane":
         return _LAYOUTS["membrane-protrusion"]
     curve = next((name for name in _GENERIC_CURVES if name in dataset), _GENERIC_CURVES[0])
-    swims = "velocity" in dataset and curve != "velocity"
-    return Layout(curve, "velocity" if swims else None, with_swim=swims, with_inset=True)
+    swims = curve != "velocity" and _swims(dataset)
+    return Layout(curve, twin="velocity" if swims else None, with_swim=swims, with_inset=True)
+
+
+def _swims(dataset: xr.Dataset) -> bool:
+    """Whether a surface moves along its axis at a speed that could be seen beside its flow."""
+    if not {"velocity", "normal_velocity"} <= set(dataset.variables):
+        return False
+    return float(np.abs(dataset["velocity"]).max()) > 1e-3 * float(np.abs(dataset["normal_velocity"]).max())
 
 
 def plot_run(dataset: xr.Dataset) -> Figure:
     """The figure of a stored run at 180 mm width; save it with `figure.savefig(path, dpi=300)`.
 
-    Layout by `dataset.attrs['scenario']`, else by its model: (a) an observable over time; (b) snapshots at instructive times,
-    all on one scale, over their profiles of velocity and curvature. Raises InputError for a dataset that cannot be drawn.
+    Layout by `dataset.attrs['scenario']`, else by its model: (a) an observable over time; (b) snapshots at instructive
+    times, all on one scale, over their profiles of velocity and curvature. Raises InputError for a dataset that cannot
+    be drawn.
     """
     layout = layout_of(dataset)
     run = read_run(dataset, layout.observables)
-    chosen = snapshot_frames(progress_measure(run, observable(dataset, layout.curve)), SNAPSHOTS)
-    profiles = [run.profile(float(k)) for k in chosen]
     with style.house_style():
-        return _build(run, layout, chosen, profiles, make_camera(run, profiles))
+        return _build(run, layout, snapshot_frames(progress_measure(run, observable(dataset, layout.curve)), SNAPSHOTS))
 
 
-def _build(run: Run, layout: Layout, chosen: Sequence[int], profiles: Sequence[Profile], camera: Camera) -> Figure:
-    """All rows on one grid; its last, narrow column is for the colour bar."""
-    limits = common_limits(profiles, camera, with_swim=layout.with_swim)
+def _build(run: Run, layout: Layout, chosen: Sequence[int]) -> Figure:
+    """Three parts, each laid out on its own: the snapshots need not leave room for the numbers of the panels."""
+    profiles = [run.profile(float(k)) for k in chosen]
+    camera = make_camera(run, profiles)
+    cameras = [camera.for_flow(f) if f > 0 else camera for f in arrow_flows(profiles, camera)]
+    limits = common_limits(profiles, cameras, with_swim=layout.with_swim)
     columns = len(profiles)
     cell_mm = (style.WIDTH_MM - 18) / max(columns, 3)
-    snapshots_mm = float(np.clip(cell_mm * (limits[3] - limits[2]) / (limits[1] - limits[0]), 18, 80)) + 8
+    snapshots_mm = float(np.clip(cell_mm * (limits[3] - limits[2]) / (limits[1] - limits[0]), 18, 80)) + 13
     heights_mm = [48.0, snapshots_mm, 84.0 if layout.with_inset else 66.0]
     figure = Figure(figsize=(style.WIDTH_MM * style.MM, sum(heights_mm) * style.MM), layout="constrained")
     FigureCanvasAgg(figure)
-    top, middle, bottom = figure.subfigures(3, 1, height_ratios=heights_mm)
+    parts = figure.subfigures(3, 1, height_ratios=heights_mm, squeeze=False)
+    top, middle, bottom = np.asarray(parts)[:, 0]
     curve = top.add_subplot()
-    panels.draw_curve(curve, run, layout.curve, layout.twin, chosen)
+    panels.draw_curve(curve, run, layout.curve, layout.words, layout.twin, chosen)
     curve.set_title("(a)", loc="left", fontweight="bold", fontsize=9)
-    _draw_snapshots(middle, run, layout, profiles, camera, limits)
+    _draw_snapshots(middle, run, layout, profiles, cameras, limits)
     _draw_panels(bottom, run, layout, profiles)
-    middle.text(0.004, 0.995, "(b)", fontweight="bold", fontsize=9, va="top")
+    middle.suptitle("(b)", x=0.004, ha="left", fontweight="bold", fontsize=9)
     return figure
 
 
@@ -103,19 +115,19 @@ def _draw_panels(part: SubFigure, run: Run, layout: Layout, profiles: Sequence[P
     for axes in rows[1]:
         axes.set_xlabel(style.axis_label(run.dataset["mesh_coordinate"]))
     if layout.with_inset:
-        panels.draw_neck_inset(rows[1][-1], run, profiles[-1])
+        panels.draw_neck_inset(rows[1][-1], profiles[-1])
 
 
-def common_limits(
-    profiles: Sequence[Profile], camera: Camera, *, with_swim: bool, strip: float = 0.42
-) -> tuple[float, float, float, float]:
+def common_limits(profiles: Sequence[Profile], cameras: Sequence[Camera], *, with_swim: bool) -> Limits:
     """(left, right, bottom, top) that hold every snapshot with its arrows, and a strip below for the keys."""
-    extents = np.array([extent(p, camera, offset_of(camera, p), with_swim=with_swim) for p in profiles])
+    pairs = zip(profiles, cameras, strict=True)
+    extents = np.array([extent(p, camera, offset_of(camera, p), with_swim=with_swim) for p, camera in pairs])
+    strip = 0.42 * cameras[0].size
     half = float(np.abs(extents[:, :2]).max())
-    return -half, half, float(extents[:, 2].min()) - strip * camera.size, float(extents[:, 3].max())
+    return -half, half, float(extents[:, 2].min()) - strip, float(extents[:, 3].max())
 
 
-def prepare_snapshot_axes(axes: Axes, limits: tuple[float, float, float, float]) -> None:
+def prepare_snapshot_axes(axes: Axes, limits: Limits) -> None:
     """Equal scales, the common limits, no frame."""
     axes.set_aspect("equal", adjustable="box")
     axes.set_xlim(limits[0], limits[1])
@@ -128,8 +140,8 @@ def _draw_snapshots(
     run: Run,
     layout: Layout,
     profiles: Sequence[Profile],
-    camera: Camera,
-    limits: tuple[float, float, float, float],
+    cameras: Sequence[Camera],
+    limits: Limits,
 ) -> None:
     """The row of snapshots with their times, keys and colour bar."""
     time = run.dataset["time"]
@@ -137,26 +149,38 @@ def _draw_snapshots(
     grid = part.add_gridspec(1, columns + 1, width_ratios=[1.0] * columns + [0.07])
     row = [part.add_subplot(grid[0, k]) for k in range(columns)]
     stamps = style.time_stamps([p.time for p in profiles], style.symbol_of(time), style.units_of(time))
-    for number, (axes, profile, stamp) in enumerate(zip(row, profiles, stamps, strict=True), start=1):
+    one_scale = len({camera.arrow_scale for camera in cameras}) == 1
+    for number, (axes, profile, camera, stamp) in enumerate(zip(row, profiles, cameras, stamps, strict=True), start=1):
         SnapshotArtists(axes, camera, with_swim=layout.with_swim).show(profile, offset_of(camera, profile))
         prepare_snapshot_axes(axes, limits)
         axes.set_title(f"$\\bf{{{number}}}$   {stamp}", pad=3)
         if layout.with_swim:
             label_speed(axes, run, camera, profile)
-    draw_arrow_key(row[0], run, camera, limits)
-    draw_length_key(row[1], run, camera, limits)
-    if columns > 2:
-        row[2].text(0, limits[2] + 0.16 * camera.size, "same scale in all", va="center", ha="center", fontsize=7)
+        if one_scale and number == 1 or not one_scale and _flows(profile, camera):
+            draw_arrow_key(axes, run, camera, limits)
+    camera = cameras[0]
+    draw_length_key(row[1] if one_scale else row[0], run, camera, limits)
+    if columns > 2 and one_scale:
+        row[2].text(0, limits[2] + 0.16 * camera.size, "same scale in all", va="center", ha="center")
     if run.is_open:
-        draw_coat_key(row[-1])
+        draw_coat_key(row[-1], camera, limits)
     elif run.regulator:
         draw_colour_bar(part, part.add_subplot(grid[0, -1]), run, camera)
 
 
-def draw_coat_key(axes: Axes) -> None:
-    """What yellow means on an open membrane."""
-    key = [Patch(facecolor=style.COAT, edgecolor=style.INK, linewidth=0.5, label="coat")]
-    axes.legend(handles=key, loc="lower right", borderaxespad=0.0, handlelength=1.0)
+def _flows(profile: Profile, camera: Camera) -> bool:
+    """Whether any arrow is long enough to be drawn."""
+    return fastest_flow(profile, camera.is_open) * camera.arrow_scale >= camera.shortest_arrow
+
+
+def draw_coat_key(axes: Axes, camera: Camera, limits: Limits) -> None:
+    """What yellow means on an open membrane, in the line of the other keys."""
+    size = camera.size
+    x, y = limits[1] - 0.62 * size, limits[2] + 0.09 * size
+    axes.add_patch(
+        Rectangle((x, y), 0.14 * size, 0.14 * size, facecolor=style.COAT, edgecolor=style.INK, linewidth=0.5)
+    )
+    axes.text(x + 0.2 * size, y + 0.07 * size, "coat", va="center", ha="left")
 
 
 def draw_colour_bar(part: Figure | SubFigure, axes: Axes, run: Run, camera: Camera) -> Colorbar:
@@ -176,10 +200,10 @@ def label_speed(axes: Axes, run: Run, camera: Camera, profile: Profile) -> None:
     y = (ahead - profile.centre) * np.cos(camera.elevation) + 0.5 * camera.swim_scale * profile.swim
     y += np.sign(profile.swim) * 0.15 * camera.size
     text = f"{style.number(abs(profile.swim), 2)} {style.units_of(run.dataset['velocity'])}"
-    axes.text(0.14 * camera.size, y, text, color=style.GREEN, va="center", ha="left", fontsize=7)
+    axes.text(0.14 * camera.size, y, text, color=style.GREEN, va="center", ha="left")
 
 
-def draw_arrow_key(axes: Axes, run: Run, camera: Camera, limits: tuple[float, float, float, float]) -> None:
+def draw_arrow_key(axes: Axes, run: Run, camera: Camera, limits: Limits) -> None:
     """A reference arrow for the flow, below the first snapshot; all snapshots share its scale."""
     if camera.arrow_scale == 0:
         return
@@ -187,19 +211,19 @@ def draw_arrow_key(axes: Axes, run: Run, camera: Camera, limits: tuple[float, fl
     y = limits[2] + 0.16 * camera.size
     x = limits[0] + 0.06 * camera.size
     length = speed * camera.arrow_scale
-    camera.quiver(axes, 1, style.RED, at=(x, y), vector=(length, 0.0))
+    camera.quiver(axes, np.array([[x], [y], [length], [0.0]]), style.RED)
     text = f"{style.number(speed)} {style.units_of(run.dataset['tangential_velocity'])}"
-    axes.text(x + length + 0.08 * camera.size, y, text, va="center", ha="left", fontsize=7, color=style.RED)
+    axes.text(x + length + 0.08 * camera.size, y, text, va="center", ha="left", color=style.RED)
 
 
-def draw_length_key(axes: Axes, run: Run, camera: Camera, limits: tuple[float, float, float, float]) -> None:
-    """A length bar below the second snapshot; all snapshots share its scale."""
+def draw_length_key(axes: Axes, run: Run, camera: Camera, limits: Limits, at: float = 0.1) -> None:
+    """A length bar below a snapshot, from `at` of its width on; all snapshots share its scale."""
     length = round_down(0.7 * camera.size)
     y = limits[2] + 0.16 * camera.size
-    x = limits[0] + 0.3 * camera.size
+    x = limits[0] + at * (limits[1] - limits[0])
     axes.add_line(Line2D([x, x + length], [y, y], color=style.INK, linewidth=1.6, solid_capstyle="butt"))
     text = f"{style.number(length)} {style.units_of(run.dataset['radius'])}"
-    axes.text(x + length + 0.08 * camera.size, y, text, va="center", ha="left", fontsize=7)
+    axes.text(x + length + 0.08 * camera.size, y, text, va="center", ha="left")
 
 
 def round_down(value: float) -> float:

@@ -24,11 +24,12 @@ PROFILE_VARIABLES = (
 REGULATORS = {"closed-surface": "concentration", "open-membrane": "local_spontaneous_curvature"}
 _TIME_SHARE = 0.35  # weight of plain time beside shape change and curve change, each of weight 1
 _COMPARED_POINTS = 81
+_LEAST_FRAMES = 2
 
 
 @dataclass(frozen=True)
 class Profile:
-    """One meridian, u from 0 (top pole) to 1, in the units of the dataset; `centre` is the mean of its highest and lowest z."""
+    """One meridian, u from 0 (top pole) to 1, in the units of the dataset."""
 
     time: float
     u: Array
@@ -44,7 +45,7 @@ class Profile:
 
     @property
     def centre(self) -> float:
-        """Axial middle of the shape."""
+        """Mean of the highest and the lowest z."""
         return 0.5 * float(self.axial.min() + self.axial.max())
 
 
@@ -66,23 +67,33 @@ class Run:
         """
         low = min(int(position), self.time.size - 1)
         weight = position - low
-        names = (*PROFILE_VARIABLES[1:], *([self.regulator] if self.regulator else []))
-        u = self.fields["mesh_coordinate"][low]
+        names = (*PROFILE_VARIABLES, *([self.regulator] if self.regulator else []))
         values = {name: self.fields[name][low] for name in names}
         time, swim = float(self.time[low]), float(self.swim[low])
         if weight > 0:
-            u_next = self.fields["mesh_coordinate"][low + 1]
-            for name in names:
+            u, u_next = (self.fields["mesh_coordinate"][k] for k in (low, low + 1))
+            for name in names[1:]:
                 after = np.interp(u, u_next, self.fields[name][low + 1])
                 values[name] = (1 - weight) * values[name] + weight * after
             time += weight * (float(self.time[low + 1]) - time)
             swim += weight * (float(self.swim[low + 1]) - swim)
-        ordered = [values[name] for name in PROFILE_VARIABLES[1:]]
-        return Profile(time, u, *ordered, values[self.regulator] if self.regulator else None, swim)
+        return Profile(
+            time=time,
+            u=values["mesh_coordinate"],
+            radius=values["radius"],
+            axial=values["axial_position"],
+            angle=values["tangent_angle"],
+            meridional_curvature=values["meridional_curvature"],
+            azimuthal_curvature=values["azimuthal_curvature"],
+            tangential=values["tangential_velocity"],
+            normal=values["normal_velocity"],
+            regulator=values[self.regulator] if self.regulator else None,
+            swim=swim,
+        )
 
 
 def read_run(dataset: xr.Dataset, observables: Iterable[str] = ()) -> Run:
-    """The arrays of `dataset`, checked: at least 2 frames, increasing time, all variables there, finite and of one shape."""
+    """The arrays of `dataset`, checked: at least 2 frames, time increases, all variables there and finite."""
     scenario = str(dataset.attrs.get("scenario", "unnamed"))
     model = str(dataset.attrs.get("model", ""))
     observables = tuple(observables)
@@ -90,14 +101,16 @@ def read_run(dataset: xr.Dataset, observables: Iterable[str] = ()) -> Run:
     wanted = [*PROFILE_VARIABLES, *observables, *([expected] if expected else [])]
     missing = [name for name in ("time", *wanted) if name not in dataset.variables]
     if missing:
-        raise InputError(f"dataset of scenario '{scenario}' lacks {', '.join(missing)}; pass the dataset of a stored run.")
+        raise InputError(
+            f"dataset of scenario '{scenario}' lacks {', '.join(missing)}; pass the dataset of a stored run."
+        )
     regulator = expected or next((name for name in REGULATORS.values() if name in dataset), None)
     if regulator and regulator not in wanted:
         wanted.append(regulator)
-    if dataset.sizes.get("time", 0) < 2:
+    frames = dataset.sizes.get("time", 0)
+    if frames < _LEAST_FRAMES:
         raise InputError(
-            f"dataset of scenario '{scenario}' has {dataset.sizes.get('time', 0)} frame(s); a picture of a run needs at "
-            "least 2, so let the run go on further."
+            f"dataset of scenario '{scenario}' has {frames} frame(s); its picture needs {_LEAST_FRAMES}: run it on."
         )
     for name in ("time", *wanted):
         dims = ("time",) if name == "time" or name in observables else ("time", "point")
@@ -123,7 +136,7 @@ def observable(dataset: xr.Dataset, name: str) -> Array:
 
 
 def shape_steps(run: Run) -> Array:
-    """Root mean square displacement of the meridian from frame to frame, at fixed u and about the centre: (frames - 1,)."""
+    """Root mean square displacement of the meridian between frames, at fixed u about the centre: (frames - 1,)."""
     u = np.linspace(0, 1, _COMPARED_POINTS)
     shapes = np.empty((run.time.size, 2, u.size))
     for k in range(run.time.size):
@@ -131,15 +144,21 @@ def shape_steps(run: Run) -> Array:
         mesh = run.fields["mesh_coordinate"][k]
         centre = 0.0 if run.is_open else 0.5 * (z.min() + z.max())
         shapes[k] = np.interp(u, mesh, run.fields["radius"][k]), np.interp(u, mesh, z - centre)
-    return np.sqrt(np.mean(np.sum(np.diff(shapes, axis=0) ** 2, axis=1), axis=-1))
+    steps: Array = np.sqrt(np.mean(np.sum(np.diff(shapes, axis=0) ** 2, axis=1), axis=-1))
+    return steps
 
 
-def progress_measure(run: Run, curve: Array) -> Array:
-    """Progress in [0, 1] at every frame: change of shape and of `curve`, and some plain time so that rest is shown too."""
-    parts = [(1.0, shape_steps(run)), (1.0, np.abs(np.diff(curve))), (_TIME_SHARE, np.diff(run.time))]
-    floor = 1e-9 * max(float(np.abs(curve).max()), float(run.fields["radius"].max()))
-    steps = sum(weight * step / step.sum() for weight, step in parts if step.sum() > floor or step is parts[-1][1])
+def progress_measure(run: Run, curve: Array, time_share: float = _TIME_SHARE) -> Array:
+    """Progress in [0, 1] at every frame: change of shape and of `curve`, and some plain time, so that rest counts."""
+    steps = time_share * np.diff(run.time) / (run.time[-1] - run.time[0])
+    scales = float(run.fields["radius"].max()), float(np.abs(curve).max())
+    for change, scale in zip((shape_steps(run), np.abs(np.diff(curve))), scales, strict=True):
+        total = float(change.sum())
+        if total > 1e-9 * scale:  # else round-off, which is no progress
+            steps = steps + change / total
     progress = np.concatenate([[0.0], np.cumsum(steps)])
+    if progress[-1] == 0:
+        return np.linspace(0, 1, progress.size)
     return np.asarray(progress / progress[-1], dtype=np.float64)
 
 
@@ -151,4 +170,4 @@ def snapshot_frames(progress: Array, count: int) -> list[int]:
 
 def frame_positions(progress: Array, count: int) -> Array:
     """`count` fractional frame positions at equal steps of progress."""
-    return np.interp(np.linspace(0, 1, count), progress, np.arange(progress.size, dtype=np.float64))
+    return np.asarray(np.interp(np.linspace(0, 1, count), progress, np.arange(progress.size, dtype=np.float64)))

@@ -6,7 +6,9 @@ import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -18,12 +20,14 @@ from matplotlib.backend_bases import RendererBase
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from shapespace.base.errors import InputError, StoreError
 from shapespace.view import panels, style
 from shapespace.view.figure import (
     Layout,
+    Limits,
     common_limits,
     draw_arrow_key,
     draw_coat_key,
@@ -33,13 +37,15 @@ from shapespace.view.figure import (
     prepare_snapshot_axes,
     round_down,
 )
-from shapespace.view.frames import frame_positions, observable, progress_measure, read_run
-from shapespace.view.snapshot import Camera, SnapshotArtists, make_camera, offset_of
+from shapespace.view.frames import Array, frame_positions, observable, progress_measure, read_run
+from shapespace.view.snapshot import Camera, SnapshotArtists, arrow_flows, make_camera, offset_of
 
 INCHES = (8.0, 4.5)
-MP4_DPI = 160  # 1280 x 720 pixels; H.264 wants even numbers
+MP4_DPI = 128  # 1024 x 576 pixels; H.264 wants even numbers
 GIF_DPI = 80  # a gif is held in memory as a whole
+_TYPE_SCALE = 1.35  # beside the type of a printed figure
 _SURFACE_BOX = (0.01, 0.02, 0.46, 0.96)  # left, bottom, width, height on the page
+_CLOCKS_LEFT = 0.665
 _CODECS = {  # by preference: which are built in differs between installations
     "libx264": ["-crf", "18", "-preset", "veryfast"],
     "libopenh264": ["-b:v", "6M"],
@@ -56,20 +62,20 @@ def save_movie(
 ) -> Path:
     """Write the movie of a stored run and return where it is.
 
-    `path` ends in .mp4 or .gif. Where no ffmpeg is found (on the PATH, or from imageio-ffmpeg) an .mp4 becomes a .gif beside it: use
-    the returned path. Frames are equally spaced in a mix of shape change and time. `progress(done, total)` is called per frame.
-    The file appears only when it is complete. Raises InputError for a dataset or path that cannot be used, StoreError where
-    the file cannot be written.
+    `path` ends in .mp4 or .gif. Where no ffmpeg is found (on the PATH, or from imageio-ffmpeg) an .mp4 becomes a .gif
+    beside it: use the returned path. Frames are equally spaced in a mix of shape change and time; `progress(done,
+    total)` is called after each. The file appears only when it is complete. Raises InputError for a dataset or path
+    that cannot be used, StoreError where the file cannot be written.
     """
     target = Path(path)
     if target.suffix.lower() not in (".mp4", ".gif"):
         raise InputError(f"path = '{target}' must end in .mp4 or .gif.")
-    if not (np.isfinite(seconds) and seconds > 0 and fps >= 1 and round(seconds * fps) >= 2):
+    if not (np.isfinite(seconds) and fps >= 1 and round(seconds * fps) > 1):
         raise InputError(f"seconds = {seconds}, fps = {fps} make no movie; at least 2 frames are needed.")
     ffmpeg = find_ffmpeg() if target.suffix.lower() == ".mp4" else None
     if ffmpeg is None:
         target = target.with_suffix(".gif")
-    with style.house_style():
+    with style.house_style(_TYPE_SCALE):
         dpi = GIF_DPI if ffmpeg is None else MP4_DPI
         scene = Scene(dataset, round(seconds * fps), dpi)
         with _writing(scene.figure, target, ffmpeg, fps) as writer:
@@ -87,9 +93,7 @@ def find_ffmpeg() -> str | None:
     if system:
         return system
     try:
-        import imageio_ffmpeg  # an extra, not a dependency  # noqa: PLC0415
-
-        return str(imageio_ffmpeg.get_ffmpeg_exe())
+        return str(import_module("imageio_ffmpeg").get_ffmpeg_exe())  # an extra, not a dependency
     except (ImportError, RuntimeError):  # RuntimeError: installed without a binary for this platform
         return None
 
@@ -106,7 +110,10 @@ def _writing(figure: Figure, target: Path, ffmpeg: str | None, fps: int) -> Iter
     """A writer into a temporary file beside `target`, moved there at the end and removed on failure."""
     part = target.with_name(f".{target.stem}.{os.getpid()}.part{target.suffix}")
     if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
-        raise StoreError(f"cannot write '{target}': '{target.parent}' is not a writable directory; choose another path.")
+        raise StoreError(
+            f"cannot write '{target}': '{target.parent}' is not a writable directory; choose another path."
+        )
+    settings: dict[Any, Any] = {"animation.ffmpeg_path": ffmpeg or "ffmpeg", "savefig.bbox": None}
     writer: AbstractMovieWriter
     if ffmpeg is None:
         writer = PillowWriter(fps=fps)
@@ -115,12 +122,13 @@ def _writing(figure: Figure, target: Path, ffmpeg: str | None, fps: int) -> Iter
         arguments = [*_CODECS[codec], "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
         writer = FFMpegWriter(fps=fps, codec=codec, extra_args=arguments)
     try:
-        with mpl.rc_context({"animation.ffmpeg_path": ffmpeg or "ffmpeg", "savefig.bbox": None}):
-            with writer.saving(figure, str(part), figure.dpi):
-                yield writer
-        os.replace(part, target)
+        with mpl.rc_context(settings), writer.saving(figure, str(part), figure.dpi):
+            yield writer
+        part.replace(target)
     except (OSError, subprocess.CalledProcessError) as error:
-        raise StoreError(f"cannot write '{target}': {_last_line(error)}; free some space or choose another path.") from error
+        raise StoreError(
+            f"cannot write '{target}': {_last_line(error)}; free some space or choose another path."
+        ) from error
     finally:
         part.unlink(missing_ok=True)
 
@@ -148,7 +156,11 @@ class Scene:
         self._values = np.interp(positions, np.arange(curve.size), curve)
         self._camera = make_camera(self._run, self._profiles, arrow_width=1.6 / 72)
         self._swims = layout.with_swim and self._camera.swim_scale > 0
-        self._limits = common_limits(self._profiles, self._camera, with_swim=self._swims)
+        self._flows = _smoothed(arrow_flows(self._profiles, self._camera))
+        cameras = [self._camera.for_flow(f) if f > 0 else self._camera for f in self._flows]
+        left, right, bottom, top = common_limits(self._profiles, cameras, with_swim=self._swims)
+        room = 0.35 * self._camera.size if self._swims else 0.0  # for the labels of the ruler
+        self._limits = (left - room, right + room, bottom, top)
         self.figure = Figure(figsize=INCHES, dpi=dpi)
         FigureCanvasAgg(self.figure)
         self._build_moving(self._draw_still(layout, dpi))
@@ -160,20 +172,30 @@ class Scene:
         run, camera = self._run, self._camera
         surface = still.add_axes(_SURFACE_BOX)
         prepare_snapshot_axes(surface, self._limits)
-        draw_arrow_key(surface, run, camera, self._limits)
-        draw_length_key(surface, run, camera, self._limits)
+        self._flow_key = self._draw_flow_key(surface)
+        draw_length_key(surface, run, camera, self._limits, at=0.38)
         if run.is_open:
-            draw_coat_key(surface)
+            draw_coat_key(surface, camera, self._limits)
         elif run.regulator:
-            draw_colour_bar(still, still.add_axes((0.485, 0.16, 0.014, 0.68)), run, camera)
-        curve = still.add_axes((0.655, 0.15, 0.255 if layout.twin else 0.315, 0.56))
-        panels.draw_curve(curve, run, layout.curve, layout.twin, [])
-        self._clocks = [Clock(still, self.figure, run.dataset["time"], 0.89, 16, style.INK)]
+            draw_colour_bar(still, still.add_axes((0.485, 0.16, 0.013, 0.68)), run, camera)
+        curve = still.add_axes((_CLOCKS_LEFT, 0.15, 0.235 if layout.twin else 0.305, 0.54))
+        panels.draw_curve(curve, run, layout.curve, layout.words, layout.twin, [])
+        self._clocks = [Clock(still, self.figure, run.dataset["time"], 0.88, 17, style.INK)]
         if self._swims:
-            self._clocks.append(Clock(still, self.figure, run.dataset["velocity"], 0.80, 11, style.GREEN))
-        canvas.draw()
-        self.figure.add_artist(Backdrop(np.array(canvas.buffer_rgba())))
+            self._clocks.append(Clock(still, self.figure, run.dataset["velocity"], 0.79, 13, style.GREEN))
+        canvas.draw()  # type: ignore[no-untyped-call]
+        self.figure.add_artist(Backdrop(np.array(canvas.buffer_rgba())))  # type: ignore[no-untyped-call]
         return curve
+
+    def _draw_flow_key(self, surface: Axes) -> Text | None:
+        """A reference arrow; where its speed changes in the course of the movie, the text that says it, on the moving figure."""
+        if np.ptp(self._flows) == 0:
+            draw_arrow_key(surface, self._run, self._camera, self._limits)
+            return None
+        size = self._camera.size
+        x, y = self._limits[0] + 0.06 * size, self._limits[2] + 0.16 * size
+        self._camera.quiver(surface, np.array([[x], [y], [self._camera.longest_arrow], [0.0]]), style.RED)
+        return Text(x + self._camera.longest_arrow + 0.08 * size, y, "", va="center", ha="left", color=style.RED)
 
     def _build_moving(self, curve: Axes) -> None:
         """The artists that move, on bare axes in the same places."""
@@ -182,19 +204,35 @@ class Scene:
         units = style.units_of(self._run.dataset["radius"])
         self._ruler = Ruler(surface, self._camera, self._limits, units) if self._swims else None
         self._artists = SnapshotArtists(surface, self._camera, with_swim=self._swims)
-        over = self.figure.add_axes(curve.get_position(), xlim=curve.get_xlim(), ylim=curve.get_ylim())
+        if self._flow_key is not None:
+            surface.add_artist(self._flow_key)
+        over = self.figure.add_axes(curve.get_position().bounds)
         over.set_axis_off()
-        (self._dot,) = over.plot([], [], "o", color=style.BLUE, markersize=9, markeredgecolor="white", zorder=6)
+        points = np.stack([[p.time for p in self._profiles], self._values], -1)
+        self._dots = curve.transAxes.inverted().transform(curve.transData.transform(points))
+        (self._dot,) = over.plot([], [], "o", color=style.BLUE, markersize=9, markeredgecolor="white", clip_on=False)
+        over.set(xlim=(0, 1), ylim=(0, 1))
 
     def show(self, k: int) -> None:
         """Move every artist to frame k."""
         profile = self._profiles[k]
-        self._artists.show(profile, offset_of(self._camera, profile))
-        self._dot.set_data([profile.time], [self._values[k]])
+        self._artists.show(profile, offset_of(self._camera, profile), float(self._flows[k]))
+        self._dot.set_data(*self._dots[k : k + 1].T)
         for clock, value in zip(self._clocks, (profile.time, profile.swim), strict=False):
             clock.show(value)
         if self._ruler is not None:
             self._ruler.show(profile.centre)
+        if self._flow_key is not None:
+            units = style.units_of(self._run.dataset["tangential_velocity"])
+            self._flow_key.set_text(f"{style.number(float(self._flows[k]), 2)} {units}")
+
+
+def _smoothed(flows: Array) -> Array:
+    """A running maximum, averaged over the same window: nowhere below `flows`, and without jumps."""
+    half = 5
+    windows = np.lib.stride_tricks.sliding_window_view(np.pad(flows, 2 * half, mode="edge"), 2 * half + 1)
+    windows = np.lib.stride_tricks.sliding_window_view(windows.max(axis=-1), 2 * half + 1)
+    return np.asarray(windows.mean(axis=-1), dtype=np.float64)
 
 
 class Backdrop(Artist):
@@ -213,16 +251,24 @@ class Backdrop(Artist):
 
 
 class Clock:
-    """`symbol = value units`: symbol and units stand on the still figure, the digits move."""
+    """`symbol = value units` at height `y` of the page: symbol and units stand on the still figure, digits move."""
 
-    def __init__(self, still: Figure, moving: Figure, variable: xr.DataArray, y: float, size: float, colour: str) -> None:
-        shared = {"fontsize": size, "color": colour, "va": "baseline"}
-        end = 0.655 + 0.0095 * size
-        still.text(0.655, y, f"{style.symbol_of(variable)} =", ha="left", **shared)
-        still.text(end + 0.0006 * size, y, style.units_of(variable), ha="left", **shared)
-        self._digits = moving.text(end, y, "", ha="right", **shared)
-        span = float(np.abs(variable.values).max()) or 1.0
+    def __init__(
+        self, still: Figure, moving: Figure, variable: xr.DataArray, y: float, size: float, colour: str
+    ) -> None:
+        values = np.asarray(variable.values, dtype=np.float64)
+        span = float(np.abs(values).max()) or 1.0
         self._decimals = max(0, 2 - int(np.floor(np.log10(span))))
+        shared: dict[str, Any] = {"fontsize": size, "color": colour, "va": "baseline"}
+        left = still.text(_CLOCKS_LEFT, y, f"{style.symbol_of(variable)} = ", ha="left", **shared)
+        widest = max((style.fixed(float(v), self._decimals) for v in (values.min(), values.max())), key=len)
+        probe = still.text(0, 0, widest, **shared)
+        page = float(still.bbox.width)
+        gap = 0.3 * size * still.dpi / 72
+        end = (left.get_window_extent().x1 + gap + probe.get_window_extent().width) / page
+        probe.remove()
+        still.text(end + gap / page, y, style.units_of(variable), ha="left", **shared)
+        self._digits = moving.text(end, y, "", ha="right", **shared)
 
     def show(self, value: float) -> None:
         """Set the digits."""
@@ -232,14 +278,14 @@ class Clock:
 class Ruler:
     """Faint lines at round heights of the lab frame, which pass by a surface that the camera follows."""
 
-    def __init__(self, axes: Axes, camera: Camera, limits: tuple[float, float, float, float], units: str) -> None:
+    def __init__(self, axes: Axes, camera: Camera, limits: Limits, units: str) -> None:
         self._limits, self._units = limits, units
         self._cos = float(np.cos(camera.elevation))
         self._step = round_down(camera.size)
         self._lines = LineCollection([], colors=style.FAINT, linewidths=0.7, zorder=0)
         axes.add_collection(self._lines, autolim=False)
         count = int((limits[3] - limits[2]) / (self._step * self._cos)) + 2
-        self._labels = [axes.text(limits[0], 0, "", fontsize=8, color="#70757C", va="bottom") for _ in range(count)]
+        self._labels = [axes.text(limits[0], 0, "", fontsize=9, color="#70757C", va="bottom") for _ in range(count)]
 
     def show(self, centre: float) -> None:
         """Place lines and labels for a camera at height `centre`."""

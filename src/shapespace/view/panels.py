@@ -8,41 +8,50 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
 from shapespace.view import style
-from shapespace.view.frames import Array, Profile, Run, observable
+from shapespace.view.frames import Array, Profile, Run, observable, progress_measure
 
 GROWTH = "growth speed"  # not an observable: the normal velocity of the apex
 _OWN_SCALE_FACTOR = 4.0  # panels of one row get their own scales where their ranges differ by more
+_EARLY = 0.03  # part of the run's time
+_REST = 0.01  # values below this part of a row's largest are at rest: not magnified
 _INSET_FACTOR = 8.0  # a peak this much above its surroundings is shown enlarged
 
 VELOCITIES = (("tangential_velocity", style.RED, "-"), ("normal_velocity", style.BLUE, (0, (4, 1.2))))
 CURVATURES = (("azimuthal_curvature", style.PURPLE, "-"), ("meridional_curvature", style.ORANGE, (0, (4, 1.2))))
 
 
-def draw_curve(axes: Axes, run: Run, name: str, twin: str | None, marked: Sequence[int]) -> None:
+def draw_curve(axes: Axes, run: Run, name: str, words: str, twin: str | None, marked: Sequence[int]) -> None:
     """An observable over time in blue, numbered dots at the `marked` frames, and a second series on the right axis."""
     values = observable(run.dataset, name)
     axes.plot(run.time, values, color=style.BLUE, zorder=3)
     axes.plot(run.time[marked], values[marked], "o", color=style.BLUE, markersize=4, markeredgecolor="white", zorder=4)
     axes.set_xlabel(style.axis_label(run.dataset["time"], words="time"))
-    axes.set_ylabel(style.axis_label(run.dataset[name], words=_words(run, name)), color=style.BLUE)
+    axes.set_ylabel(style.axis_label(run.dataset[name], words=words or name.replace("_", " ")), color=style.BLUE)
     axes.tick_params(axis="y", labelcolor=style.BLUE)
-    axes.margins(x=0.015)
-    axes.margins(y=0.12)
+    _scale_time(axes, run, values)
+    axes.margins(x=0.015, y=0.12)
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
     _number_dots(axes, run.time, values, marked)
     if twin is not None:
         _draw_twin(axes, run, twin)
 
 
-def _words(run: Run, name: str) -> str:
-    return str(run.dataset[name].attrs.get("long_name", name)).replace("_", " ")
+def _scale_time(axes: Axes, run: Run, values: Array) -> None:
+    """Logarithmic time, linear near 0, where most of the change takes up too small a part of a linear axis."""
+    change = progress_measure(run, values, time_share=0.0)
+    early, half = (float(np.interp(part, change, run.time)) - run.time[0] for part in (0.03, 0.5))
+    if run.time[0] == 0 and half < _EARLY * run.time[-1]:
+        linear = 10.0 ** np.floor(np.log10(early))
+        axes.set_xscale("symlog", linthresh=linear, linscale=0.6)
 
 
 def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int]) -> None:
     """Numbers beside the dots, on the side away from the curve's bend: above where it is concave, else below."""
     span = float(np.ptp(values)) or 1.0
-    width = float(time[-1] - time[0])
+    place = axes.transScale.transform(np.stack([time, values], -1))[:, 0]
+    width = float(place[-1] - place[0])
     for number, k in enumerate(marked, start=1):
-        before, after = (np.interp(time[k] + side * 0.02 * width, time, values) for side in (-1, 1))
+        before, after = (np.interp(place[k] + side * 0.02 * width, place, values) for side in (-1, 1))
         slope = (after - before) / span / 0.04 * 0.25  # on the page, axes about four times as wide as high
         normal = np.array([-slope, 1.0]) / np.hypot(slope, 1.0)
         at_end = k in (0, time.size - 1)
@@ -65,19 +74,24 @@ def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int]) 
 
 
 def _draw_twin(axes: Axes, run: Run, twin: str) -> None:
-    """A second series on the right: the apex speed in red (as the flow arrows), or the swimming speed in green (as its arrow)."""
+    """A second series on the right: growth speed in red as the flow arrows, another in green as the swimming arrow."""
     right = axes.twinx()
     right.spines["right"].set_visible(True)
     if twin == GROWTH:
-        values, colour = run.fields["normal_velocity"][:, 0], style.RED
+        values, colour = run.fields["normal_velocity"][:, 0].copy(), style.RED
+        if not run.fields["normal_velocity"][0].any():
+            values[0] = np.nan  # the initial state has no velocity yet: it is given, not solved for
         text = f"growth speed ({style.units_of(run.dataset['normal_velocity'])})"
     else:
         values, colour = observable(run.dataset, twin), style.GREEN
-        text = style.axis_label(run.dataset[twin], words="swimming speed" if twin == "velocity" else _words(run, twin))
+        text = style.axis_label(
+            run.dataset[twin], words="swimming speed" if twin == "velocity" else twin.replace("_", " ")
+        )
     right.plot(run.time, values, color=colour, linestyle=(0, (4, 1.2)), zorder=2)
     right.set_ylabel(text, color=colour)
     right.tick_params(axis="y", labelcolor=colour)
     right.margins(y=0.12)
+    right.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
     axes.set_zorder(right.get_zorder() + 1)
     axes.patch.set_visible(False)
 
@@ -94,13 +108,17 @@ def draw_profiles(
         axes.set_xlim(0, 1)
         axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
         axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
-    least = 1.0 / float(run.fields["radius"].max()) if words == "curvature" else 0.0
-    ranges = [_range(profile, variables, least) for profile in profiles]
+    size = float(run.fields["radius"].max())
+    ranges = [_range(profile, variables, 1.0 / size if words == "curvature" else 0.0) for profile in profiles]
     common = min(low for low, _ in ranges), max(high for _, high in ranges)
-    widest, narrowest = max(h - low for low, h in ranges), min(h - low for low, h in ranges)
-    apart = words == "curvature" and widest > _OWN_SCALE_FACTOR * narrowest
+    widths = np.array([high - low for low, high in ranges])
+    seen = widths > _REST * widths.max()
+    apart = bool(seen.any()) and widths.max() > _OWN_SCALE_FACTOR * widths[seen].min()
     for k, (axes, (low, high)) in enumerate(zip(row, ranges, strict=True)):
-        low, high = (low, high) if apart else common
+        if not apart:
+            low, high = common
+        elif not seen[k]:
+            low, high = _REST * common[0], _REST * common[1]
         pad = 0.08 * (high - low) or 1.0
         axes.set_ylim(low - pad, high + pad)
         axes.tick_params(labelleft=apart or k == 0)
@@ -126,7 +144,7 @@ def _range(profile: Profile, variables: Sequence[tuple[str, str, object]], least
     return low - 0.5 * missing, high + 0.5 * missing
 
 
-def draw_neck_inset(axes: Axes, run: Run, profile: Profile) -> Axes | None:
+def draw_neck_inset(axes: Axes, profile: Profile) -> Axes | None:
     """The meridional curvature around its peak near u = 1/2, stretched in u; None where there is no such peak."""
     curvature, u = profile.meridional_curvature, profile.u
     middle = np.abs(u - 0.5) < 0.15
@@ -138,7 +156,7 @@ def draw_neck_inset(axes: Axes, run: Run, profile: Profile) -> Axes | None:
     around = np.abs(u - 0.5)[middle & (peak > 0.1 * peak[k])].max()
     power = int(np.floor(np.log10(around)))
     half = float(np.ceil(around * 10.0**-power))
-    name, colour, _ = CURVATURES[1]
+    _, colour, _ = CURVATURES[1]
     # Same heights as in the panel around it: its y axis serves both.
     bottom, top = (1.06 * curvature[k], 0.0) if curvature[k] < 0 else (0.0, 1.06 * curvature[k])
     inset = axes.inset_axes((0.58, bottom, 0.42, top - bottom), transform=axes.transData)
@@ -154,6 +172,6 @@ def draw_neck_inset(axes: Axes, run: Run, profile: Profile) -> Axes | None:
         inset.spines["bottom"].set_visible(False)
     inset.tick_params(pad=1.0, length=2)
     factor = f"10^{{{-power}}}\\," if power else ""
-    inset.set_xlabel(rf"${factor}(u-\frac{{1}}{{2}})$", fontsize=7, labelpad=2, x=1.0, ha="right")
+    inset.set_xlabel(rf"${factor}(u-\frac{{1}}{{2}})$", fontsize=7, labelpad=3.5, x=1.0, ha="right")
     inset.set_in_layout(False)
     return inset

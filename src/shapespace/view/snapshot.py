@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.collections import LineCollection, TriMesh
-from matplotlib.colors import Normalize
+from matplotlib.colors import Normalize, PowerNorm
 from matplotlib.quiver import Quiver
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
@@ -22,9 +22,11 @@ from shapespace.view.frames import Array, Profile, Run
 
 _RINGS = 132  # points of the drawn meridian
 _FACETS = 72  # points of a drawn parallel
+_OWN_SCALE_FACTOR = 10.0  # between the flows of the snapshots
+_REST = 1e-3  # a flow below this part of the fastest counts as rest
 _LIGHT = np.array([-0.42, 0.62, 0.66]) / np.linalg.norm([-0.42, 0.62, 0.66])
 _SHADE = np.array([0.25, 0.32, 0.42])  # what is left of red, green and blue in full shade: bluish, as under a sky
-_GLINT = (_LIGHT + [0, 0, 1]) / np.linalg.norm(_LIGHT + [0, 0, 1])
+_GLINT = (_LIGHT + np.array([0, 0, 1])) / np.linalg.norm(_LIGHT + np.array([0, 0, 1]))
 
 
 @dataclass(frozen=True)
@@ -41,14 +43,9 @@ class Camera:
     arrow_width: float  # of a shaft, in inches
 
     @property
-    def arrows(self) -> int:
-        """Number of arrows per meridian."""
-        return 7 if self.is_open else 11
-
-    @property
     def longest_arrow(self) -> float:
-        """Length on the page of the fastest flow: short on an open membrane, where arrows from both sides meet on top."""
-        return (0.3 if self.is_open else 0.6) * self.size
+        """Length on the page of the fastest flow: no longer than the space between two arrows."""
+        return (0.3 if self.is_open else 0.4) * self.size
 
     @property
     def shortest_arrow(self) -> float:
@@ -60,17 +57,32 @@ class Camera:
         """The same for the thicker arrow of the swimming speed."""
         return 0.06 * self.size
 
-    def quiver(
-        self, axes: Axes, count: int, colour: str, thick: float = 1.0, at: tuple[float, float] = (0, 0), vector=(0.0, 0.0)
-    ) -> Quiver:
-        """Arrows in data units, all at `at` until moved."""
-        place = np.broadcast_to(np.array([*at, *vector])[:, None], (4, count))
-        units = {"units": "inches", "angles": "xy", "scale_units": "xy", "scale": 1.0, "width": thick * self.arrow_width}
-        head = {"headwidth": 4.0, "headlength": 4.2, "headaxislength": 3.8, "minlength": 0.0, "minshaft": 1.2}
-        return axes.quiver(*place, color=colour, edgecolor="white", linewidth=0.2, zorder=4, **units, **head)
+    def for_flow(self, speed: float) -> "Camera":
+        """The same camera with an arrow scale on which `speed` > 0 has the longest arrow."""
+        return replace(self, arrow_scale=self.longest_arrow / speed)
+
+    def quiver(self, axes: Axes, arrows: Array, colour: str, thick: float = 1.0) -> Quiver:
+        """Arrows (4, n) given as x, y of their tails and vectors, on the scale of the axes."""
+        return axes.quiver(
+            *arrows,
+            color=colour,
+            edgecolor="white",
+            linewidth=0.2,
+            zorder=4,
+            units="inches",
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            width=thick * self.arrow_width,
+            headwidth=4.0,
+            headlength=4.2,
+            headaxislength=3.8,
+            minlength=0.0,
+            minshaft=1.2,
+        )
 
     def project(self, x: Array, front: Array, z: Array) -> tuple[Array, Array]:
-        """Screen coordinates of points given by their components along the page, towards the viewer, and along the axis."""
+        """Screen coordinates of points given along the page, towards the viewer, and along the axis."""
         return x, z * np.cos(self.elevation) - front * np.sin(self.elevation)
 
 
@@ -87,14 +99,40 @@ def make_camera(run: Run, profiles: Sequence[Profile], arrow_width: float = 1.15
     """The common camera for `profiles`; the fastest flow among them gets the longest arrow."""
     size = max(float(p.radius.max()) for p in profiles)
     mappable, exceeds = _regulator_colours(run, profiles)
-    fastest = max(float(np.hypot(*arrow_velocity(p, tangential_only=run.is_open)).max()) for p in profiles)
+    fastest = max(fastest_flow(p, run.is_open) for p in profiles)
     swim = max(abs(p.swim) for p in profiles)
     # Round-off is not a flow, and a surface that stays where it is does not swim.
     rest = 1e-9 * size / float(run.time[-1] - run.time[0])
-    flows, swims = fastest > rest, swim > max(rest, 1e-3 * fastest)
-    elevation = float(np.deg2rad(24.0 if run.is_open else 13.0))
-    camera = Camera(elevation, mappable, exceeds, 0.0, 0.4 * size / swim if swims else 0.0, size, run.is_open, arrow_width)
-    return replace(camera, arrow_scale=camera.longest_arrow / fastest) if flows else camera
+    swims = swim > max(rest, _REST * fastest)
+    camera = Camera(
+        elevation=float(np.deg2rad(24.0 if run.is_open else 8.0)),
+        colours=mappable,
+        colours_exceed=exceeds,
+        arrow_scale=0.0,
+        swim_scale=0.4 * size / swim if swims else 0.0,
+        size=size,
+        is_open=run.is_open,
+        arrow_width=arrow_width,
+    )
+    return camera.for_flow(fastest) if fastest > rest else camera
+
+
+def arrow_flows(profiles: Sequence[Profile], camera: Camera) -> Array:
+    """The flow speed that gets the longest arrow, for each of `profiles`: one for all where one scale can serve.
+
+    Where the flow dies away by orders of magnitude each state has its own, down to 1e-3 of the fastest. All 0 at rest.
+    """
+    flows = np.array([fastest_flow(p, camera.is_open) for p in profiles])
+    fastest = float(flows.max())
+    if camera.arrow_scale == 0:
+        return np.zeros_like(flows)
+    apart = fastest > _OWN_SCALE_FACTOR * flows[flows > _REST * fastest].min()
+    return np.maximum(flows, _REST * fastest) if apart else np.full_like(flows, fastest)
+
+
+def fastest_flow(profile: Profile, is_open: bool) -> float:
+    """The largest speed that an arrow shows."""
+    return float(np.hypot(*arrow_velocity(profile, _arrow_places(is_open), tangential_only=is_open)).max())
 
 
 def _regulator_colours(run: Run, profiles: Sequence[Profile]) -> tuple[ScalarMappable, bool]:
@@ -104,26 +142,37 @@ def _regulator_colours(run: Run, profiles: Sequence[Profile]) -> tuple[ScalarMap
     values = np.concatenate([p.regulator for p in profiles if p.regulator is not None])
     if run.is_open:
         peak = values[np.argmax(np.abs(values))]
-        return ScalarMappable(Normalize(*sorted((0.0, float(peak) or 1.0))), style.coat_map()), False
-    areas = np.concatenate([np.gradient(p.u) * p.radius / np.trapezoid(p.radius, p.u) for p in profiles]) / len(profiles)
+        return ScalarMappable(Normalize(min(0.0, float(peak)), max(0.0, float(peak)) or 1.0), style.coat_map()), False
+    areas = np.concatenate([np.gradient(p.u) * p.radius / np.trapezoid(p.radius, p.u) for p in profiles])
     order = np.argsort(values)
-    top = float(np.interp(0.99, np.cumsum(areas[order]), values[order]))
+    top = float(np.interp(0.99 * len(profiles), np.cumsum(areas[order]), values[order]))
     exceeds = float(values.max()) > 1.25 * top
     limits = (min(0.0, float(values.min())), top if exceeds else float(values.max()))
     if limits[1] <= limits[0]:
         limits = (limits[0], limits[0] + 1.0)
-    return ScalarMappable(Normalize(*limits), style.regulator_map()), exceeds
+    # A narrow peak would leave all else pale on a linear scale.
+    norm = PowerNorm(0.5, *limits) if exceeds and limits[0] == 0 else Normalize(*limits)
+    return ScalarMappable(norm, style.regulator_map()), exceeds
 
 
-def arrow_velocity(profile: Profile, *, tangential_only: bool) -> tuple[Array, Array]:
-    """(v_r, v_z) = v_u (cos psi, -sin psi) + v_n (sin psi, cos psi), the second term left out on request."""
-    cos, sin = np.cos(profile.angle), np.sin(profile.angle)
-    normal = np.zeros_like(profile.normal) if tangential_only else profile.normal
-    return profile.tangential * cos + normal * sin, -profile.tangential * sin + normal * cos
+def _arrow_places(is_open: bool) -> Array:
+    """The u at which arrows stand: off the poles, and on the equator of a closed surface."""
+    count = 7 if is_open else 11
+    return (np.arange(count) + 0.5) / count
+
+
+def arrow_velocity(profile: Profile, at: Array, *, tangential_only: bool) -> tuple[Array, Array]:
+    """(v_r, v_z) = v_u (cos psi, -sin psi) + v_n (sin psi, cos psi) at u = `at`, without v_n on request."""
+    angle, tangential, normal = (
+        np.interp(at, profile.u, v) for v in (profile.angle, profile.tangential, profile.normal)
+    )
+    cos, sin = np.cos(angle), np.sin(angle)
+    normal = 0 * normal if tangential_only else normal
+    return tangential * cos + normal * sin, -tangential * sin + normal * cos
 
 
 def drawn_meridian(profile: Profile) -> tuple[Array, Array, Array, Array | None]:
-    """(r, z, psi, regulator) at points that share out arc length and turning, so that poles and narrow necks stay round."""
+    """(r, z, psi, regulator) at points shared out by arc length and turning: poles and narrow necks stay round."""
     turning = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(profile.angle)))])
     measure = profile.u + 0.6 * turning / max(float(turning[-1]), 1e-300)
     at = np.linspace(measure[0], measure[-1], _RINGS)
@@ -187,9 +236,9 @@ def velocity_arrows(profile: Profile, camera: Camera, offset: float = 0.0) -> tu
 
     They start on the surface; where they would cross the axis, as at a closing neck, they end on it.
     """
-    at = (np.arange(camera.arrows) + 0.5) / camera.arrows
-    v_r, v_z = arrow_velocity(profile, tangential_only=camera.is_open)
-    r, z, v_r, v_z = (np.interp(at, profile.u, v) for v in (profile.radius, profile.axial + offset, v_r, v_z))
+    at = _arrow_places(camera.is_open)
+    v_r, v_z = arrow_velocity(profile, at, tangential_only=camera.is_open)
+    r, z = (np.interp(at, profile.u, v) for v in (profile.radius, profile.axial + offset))
     tails, vectors = [], []
     crosses_axis = r + v_r * camera.arrow_scale < 0
     for sign in (-1, 1):
@@ -219,18 +268,19 @@ class SnapshotArtists:
         axes.add_collection(self._outline, autolim=False)
         self._axes = axes
         self._mesh: TriMesh | None = None
-        count = 2 * camera.arrows
-        self.flow = camera.quiver(axes, count, style.RED)
-        self.swim = camera.quiver(axes, 1, style.GREEN, thick=1.9)
+        self.flow = camera.quiver(axes, np.zeros((4, 2 * _arrow_places(camera.is_open).size)), style.RED)
+        self.swim = camera.quiver(axes, np.zeros((4, 1)), style.GREEN, thick=1.9)
 
-    def show(self, profile: Profile, offset: float = 0.0) -> None:
-        """Draw `profile` moved by `offset` along the axis."""
+    def show(self, profile: Profile, offset: float = 0.0, flow: float = 0.0) -> None:
+        """Draw `profile` moved by `offset` along the axis; a `flow` > 0 sets the speed of the longest arrow."""
+        if flow > 0:
+            self.camera = self.camera.for_flow(flow)
         surface = make_surface(profile, self.camera, offset)
         if self._mesh is not None:
             self._mesh.remove()
-        triangulation = Triangulation(*surface.vertices.T, triangles=surface.triangles)
+        triangulation = Triangulation(surface.vertices[:, 0], surface.vertices[:, 1], surface.triangles)
         self._mesh = TriMesh(triangulation, zorder=2)
-        self._mesh.set_facecolor(surface.colours)
+        self._mesh.set_facecolor(surface.colours)  # type: ignore[arg-type]  # the stubs know no array of colours
         self._mesh.set_rasterized(True)
         self._axes.add_collection(self._mesh, autolim=False)
         self._outline.set_segments(silhouette(profile, self.camera, offset))
@@ -252,7 +302,9 @@ def offset_of(camera: Camera, profile: Profile) -> float:
     return 0.0 if camera.is_open else -profile.centre
 
 
-def extent(profile: Profile, camera: Camera, offset: float = 0.0, *, with_swim: bool) -> tuple[float, float, float, float]:
+def extent(
+    profile: Profile, camera: Camera, offset: float = 0.0, *, with_swim: bool
+) -> tuple[float, float, float, float]:
     """(left, right, bottom, top) of everything drawn for `profile`, arrow heads included."""
     outline = np.concatenate([line[~np.isnan(line[:, 0])] for line in silhouette(profile, camera, offset)])
     pieces = [outline]

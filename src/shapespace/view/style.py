@@ -4,8 +4,10 @@ import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
+from typing import Any
 
 import matplotlib as mpl
+import matplotlib.style
 import numpy as np
 import xarray as xr
 from matplotlib.colors import Colormap, LinearSegmentedColormap
@@ -24,13 +26,13 @@ FAINT = "#B8BDC4"
 MEMBRANE = "#C3CAD3"
 COAT = "#F5C518"
 
-_RC = {
+_RC: dict[Any, Any] = {
     "font.family": ["sans-serif"],
     "font.size": 7.5,
-    "axes.labelsize": 8,
-    "axes.titlesize": 8,
-    "xtick.labelsize": 7,
-    "ytick.labelsize": 7,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.0,
+    "xtick.labelsize": 7.0,
+    "ytick.labelsize": 7.0,
     "legend.fontsize": 7.5,
     "axes.linewidth": 0.6,
     "axes.edgecolor": INK,
@@ -54,23 +56,24 @@ _RC = {
 }
 
 _GREEK = (
-    "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi pi rho sigma tau phi chi psi omega "
-    "Gamma Delta Theta Lambda Xi Pi Sigma Phi Psi Omega"
-).split()
-_GREEK_WORD = re.compile(rf"(?<![A-Za-z\\])({'|'.join(_GREEK)})(?![A-Za-z])")
+    "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|phi|chi|psi|omega|"
+    "Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega"
+)
+_GREEK_WORD = re.compile(rf"(?<![A-Za-z\\])({_GREEK})(?![A-Za-z])")
 _UNIT_TOKEN = re.compile(r"(?P<name>[^\W\d_]+)(?P<index>_\w+|\d+)?(?:(?:\*\*|\^)?(?P<power>[-+]?\d+))?|(?P<other>\S)")
 
 
 @contextmanager
-def house_style() -> Iterator[None]:
-    """Defaults of new artists inside the block: set for its duration only, so that a user's own pictures keep theirs."""
-    with mpl.rc_context(_RC):
+def house_style(scale: float = 1.0) -> Iterator[None]:
+    """Defaults of new artists inside the block, type `scale` times larger; a user's own pictures keep their looks."""
+    type_sizes = {key: value * scale for key, value in _RC.items() if key.endswith("size") and isinstance(value, float)}
+    with mpl.style.context(["default", _RC | type_sizes]):
         yield
 
 
 @cache
 def regulator_map() -> Colormap:
-    """Pale sand over teal to deep blue: lightness falls evenly, no red or green, so arrows and shading stay readable."""
+    """Pale sand over teal to deep blue: lightness falls evenly; no red or green, the colours of the arrows."""
     stops = ["#F7F1DE", "#D3E6CF", "#9CD2C9", "#62B4C4", "#3A90BF", "#2B68AC", "#27408B", "#1D1E5C"]
     return LinearSegmentedColormap.from_list("shapespace_regulator", stops, N=512)
 
@@ -116,8 +119,8 @@ def math_units(units: str) -> str:
         name, index = match["name"], (match["index"] or "").lstrip("_")
         if name == "Rb":
             name, index = "R", "b"
-        is_scale = bool(index) or name in _GREEK
-        text = f"\\{name}" if name in _GREEK else name if is_scale else rf"\mathrm{{{name}}}"
+        is_greek = _GREEK_WORD.fullmatch(name) is not None
+        text = f"\\{name}" if is_greek else name if index else rf"\mathrm{{{name}}}"
         return text + (f"_{{{_greek(index)}}}" if index else "") + (f"^{{{match['power']}}}" if match["power"] else "")
 
     text = "$" + _UNIT_TOKEN.sub(token, units.replace("**", "^").replace("µ", "μ")) + "$"
@@ -137,7 +140,7 @@ def units_of(variable: xr.DataArray) -> str:
 
 def axis_label(*variables: xr.DataArray, words: str = "") -> str:
     """`words symbols (units)` of variables that share one axis."""
-    symbols = ", ".join(symbol_of(v) for v in variables)
+    symbols = ", ".join(symbol_of(v) for v in variables if v.attrs.get("symbol") or not words)
     units = units_of(variables[0])
     return " ".join(part for part in (words, symbols, f"({units})" if units else "") if part)
 

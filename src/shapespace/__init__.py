@@ -1,0 +1,50 @@
+"""Dynamics, stationary shapes and shape spaces of axisymmetric active fluid surfaces.
+
+    import shapespace as ss
+
+    run = ss.run(ss.scenario("guided-division"), out="results/division")
+    run.dataset["neck_radius"]
+    ss.plot(run)
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from shapespace.base.errors import InputError as InputError
+    from shapespace.base.errors import StoreError as StoreError
+    from shapespace.base.outcome import Outcome as Outcome
+    from shapespace.study.dataset import open_dataset as open_dataset
+    from shapespace.study.run import Run as Run
+    from shapespace.study.run import run as run
+    from shapespace.study.scenario import Scenario as Scenario
+    from shapespace.study.scenario import load_scenario as load_scenario
+    from shapespace.study.scenario import scenario as scenario
+    from shapespace.study.scenario import scenario_names as scenario_names
+    from shapespace.view.show import movie as movie
+    from shapespace.view.show import plot as plot
+
+__version__ = "0.1.0"
+
+_HOMES = {
+    "InputError": "base.errors",
+    "StoreError": "base.errors",
+    "Outcome": "base.outcome",
+    "open_dataset": "study.dataset",
+    "Run": "study.run",
+    "run": "study.run",
+    "Scenario": "study.scenario",
+    "load_scenario": "study.scenario",
+    "scenario": "study.scenario",
+    "scenario_names": "study.scenario",
+    "movie": "view.show",
+    "plot": "view.show",
+}
+__all__ = [*_HOMES, "__version__"]
+
+
+def __getattr__(name: str) -> Any:
+    """Public names, loaded on first use: `shapespace --help` should not wait for the array library."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -1,0 +1,43 @@
+"""Pictures of runs, stored or in memory: what `ss.plot` and `ss.movie` do."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from shapespace.study.dataset import open_dataset
+from shapespace.view.figure import plot_run
+from shapespace.view.movie import save_movie
+
+
+class HasDataset(Protocol):
+    """A run: anything with a dataset."""
+
+    @property
+    def dataset(self) -> xr.Dataset:
+        """Fields and observables of all frames."""
+
+
+Source = HasDataset | xr.Dataset | str | Path
+"""A run, its dataset, or the directory of a stored run."""
+
+
+def _dataset_of(source: Source) -> xr.Dataset:
+    if isinstance(source, xr.Dataset):
+        return source
+    return open_dataset(source) if isinstance(source, str | Path) else source.dataset
+
+
+def plot(source: Source, out: str | Path | None = None) -> Figure:
+    """The figure of a run, in the layout of the paper's figure; also written to `out` (.png, .pdf, .svg) if given."""
+    figure = plot_run(_dataset_of(source))
+    if out is not None:
+        figure.savefig(out)
+    return figure
+
+
+def movie(source: Source, out: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
+    """Write the movie of a run as .mp4, or .gif where there is no ffmpeg; returns the path written."""
+    return save_movie(_dataset_of(source), Path(out), progress)

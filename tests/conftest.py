@@ -1,0 +1,16 @@
+"""What all tests share: a persistent compilation cache, so that only the first run pays for compiling."""
+
+import os
+import sys
+
+import pytest
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep compiled functions under pytest's cache folder, unless the environment names another; child processes too."""
+    if "JAX_COMPILATION_CACHE_DIR" not in os.environ and config.cache is not None:
+        os.environ["JAX_COMPILATION_CACHE_DIR"] = str(config.cache.mkdir("jax"))
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0")
+    os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
+    if "jax" in sys.modules:
+        raise pytest.UsageError("jax was imported before its cache was configured: a plugin must have loaded it.")

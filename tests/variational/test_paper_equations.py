@@ -1,0 +1,267 @@
+"""The equations derived by differentiation of one density agree with the paper's explicit ones, on arbitrary states.
+
+A state is a set of random Taylor polynomials in u about random points, with r' = h cos(psi), a' = r h and rates that keep
+these, and nothing else: no balance holds, so whole expressions are compared, not zeros.
+"""
+
+from collections.abc import Callable
+from functools import cache
+from math import factorial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from tests.exact import paper_equations as paper
+
+from shapespace.base.arrays import Array, Traced
+from shapespace.geometry.curve import Geometry
+from shapespace.geometry.motion import Rates, coordinate_flow
+from shapespace.geometry.parameterization import eulerian_rates, lagrangian_rates
+from shapespace.models.closed_surface import make_closed_surface
+from shapespace.models.open_membrane import make_open_membrane
+from shapespace.physics.term import Site
+from shapespace.variational.rayleighian import density
+from shapespace.variational.surface import SurfaceSystem
+
+SYSTEMS = {"closed": make_closed_surface(azimuthal=True), "open": make_open_membrane(azimuthal=True)}
+SEEDS = (0, 1, 2)
+POINTS = 40
+ORDER = 6
+TOLERANCE = 1e-10
+
+FREE = ("h", "psi", "z", "r_t", "z_t", "v", "v_phi", "c", "c_t", "gamma", "moment", "alpha", "beta")
+FLUXES = ("meridional_force", "azimuthal_force", "species_flux")
+
+Series = dict[str, Array]
+"""Taylor coefficients about each point, (ORDER + 1, POINTS), by name."""
+
+
+def product(a: Array, b: Array) -> Array:
+    """Coefficients of a b."""
+    return np.array([sum(a[k] * b[n - k] for k in range(n + 1)) for n in range(ORDER + 1)])
+
+
+def slope(a: Array) -> Array:
+    """Coefficients of a'; the last is unknown and set to 0."""
+    return np.array([(n + 1) * a[n + 1] for n in range(ORDER)] + [0 * a[0]])
+
+
+def antiderivative(a: Array, start: Array) -> Array:
+    """Coefficients of the integral of a that begins at `start`."""
+    return np.array([start, *(a[n] / (n + 1) for n in range(ORDER))])
+
+
+def sine_and_cosine(a: Array) -> tuple[Array, Array]:
+    """Coefficients of sin(a) and cos(a), from sin' = a' cos and cos' = -a' sin."""
+    sin, cos = [np.sin(a[0])], [np.cos(a[0])]
+    for n in range(1, ORDER + 1):
+        sines = sum(k * a[k] * cos[n - k] for k in range(1, n + 1)) / n
+        cosines = -sum(k * a[k] * sin[n - k] for k in range(1, n + 1)) / n
+        sin.append(sines)
+        cos.append(cosines)
+    return np.array(sin), np.array(cos)
+
+
+def reciprocal(a: Array) -> Array:
+    """Coefficients of 1/a."""
+    found = [1 / a[0]]
+    for n in range(1, ORDER + 1):
+        found.append(-sum(a[k] * found[n - k] for k in range(1, n + 1)) / a[0])
+    return np.array(found)
+
+
+def random_series(seed: int, *, uniform_length: bool) -> tuple[Series, Array]:
+    """A state, and the points u it belongs to."""
+    rng = np.random.default_rng(seed)
+    decay = np.array([1 / factorial(n) for n in range(ORDER + 1)])[:, None]
+    q = {name: decay * rng.normal(size=(ORDER + 1, POINTS)) for name in (*FREE, *FLUXES)}
+    q["psi"][0] = rng.uniform(-np.pi, np.pi, POINTS)
+    q["h"][0], q["c"][0] = rng.uniform(0.5, 1.5), rng.uniform(0.3, 3.0, POINTS)
+    if uniform_length:
+        q["h"][1:] = 0.0
+    sin, cos = sine_and_cosine(q["psi"])
+    q["r"] = antiderivative(product(q["h"], cos), rng.uniform(0.4, 2.0, POINTS))
+    q["area"] = antiderivative(product(q["r"], q["h"]), rng.uniform(0.0, 1.2, POINTS))
+    q["v_n"] = product(sin, q["r_t"]) + product(cos, q["z_t"])
+    dr_t, dz_t = slope(q["r_t"]), slope(q["z_t"])
+    q["psi_t"] = -product(reciprocal(q["h"]), product(dr_t, sin) + product(dz_t, cos))
+    q["h_t"] = product(dr_t, cos) - product(dz_t, sin)
+    q["element"] = product(q["r"], q["h"])
+    q["element_t"] = product(q["r_t"], q["h"]) + product(q["r"], q["h_t"])
+    q["amount_t"] = product(q["c_t"], q["element"]) + product(q["c"], q["element_t"])
+    return q, rng.uniform(size=POINTS)
+
+
+def random_parameters(system: SurfaceSystem, seed: int) -> dict[str, float]:
+    """Positive random constants, with a coat and a pulled patch whose edges lie within the surface; p and v0 too."""
+    rng = np.random.default_rng(100 + seed)
+    values = {name: float(rng.uniform(0.5, 2.0)) for name in system.parameters}
+    patches = {"coat_area": 0.4, "coat_sharpness": 2.5, "pulled_area": 0.7, "pulled_sharpness": 1.5}
+    return values | {name: value for name, value in patches.items() if name in values} | {"p": -0.7, "v0": 0.3}
+
+
+class Case(NamedTuple):
+    """A state in the paper's terms; `at` holds values and derivatives (d, dd, ddd) by name."""
+
+    shape: paper.Shape
+    flow: paper.Flow
+    material: paper.Material
+    at: dict[str, Array]
+    c: dict[str, float]
+
+
+def make_case(kind: str, q: Series, c: dict[str, float]) -> Case:
+    """Values at the points from Taylor coefficients."""
+    at = {"d" * n + name: factorial(n) * a[n] for name, a in q.items() for n in range(4)}
+    zero = np.zeros(POINTS)
+    common = {"kappa": c["bending_rigidity"], "eta_s": c["shear_viscosity"], "friction": c["friction"]}
+    common["f_phi"] = c["friction"] * c["rotation_rate"] * at["r"]
+    if kind == "closed":
+        C0 = (c["spontaneous_curvature"] + zero, zero, zero)
+        active = paper.active_tension(c["active_tension"], c["saturation_concentration"], at["c"], at["dc"])
+        material = paper.Material(
+            **common, eta_b=c["bulk_viscosity"], gamma=c["tension"] + zero, dgamma=zero,
+            active=active[0], dactive=active[1], f_n=c["p"] + zero, f_u=zero,
+        )  # fmt: skip
+    else:
+        coat = paper.patch(c["spontaneous_curvature"], c["coat_area"], c["coat_sharpness"], at["area"])
+        C0 = (coat[0], coat[1] * at["darea"], coat[2] * at["darea"] ** 2 + coat[1] * at["ddarea"])
+        total = np.log1p(np.exp(2 * c["pulled_sharpness"] * c["pulled_area"])) / (2 * c["pulled_sharpness"])
+        f_z = paper.patch(c["pulling_force"] / (2 * np.pi * total), c["pulled_area"], c["pulled_sharpness"], at["area"])
+        material = paper.Material(
+            **common, eta_b=0.0, gamma=at["gamma"], dgamma=at["dgamma"], active=zero, dactive=zero,
+            f_n=f_z[0] * np.cos(at["psi"]), f_u=-f_z[0] * np.sin(at["psi"]),
+        )  # fmt: skip
+    shape = paper.Shape(*(at[n] for n in ("r", "psi", "dpsi", "ddpsi", "dddpsi", "h", "dh", "ddh")), *C0)
+    flow = paper.Flow(*(at["d" * n + name] for name in ("v_n", "v", "v_phi") for n in range(3)))
+    return Case(shape, flow, material, at, c)
+
+
+def stack(q: Series, names: tuple[str, ...]) -> Traced:
+    """Coefficients (POINTS, fields, ORDER + 1) of the named series."""
+    return jnp.asarray(np.stack([q[name].T for name in names], axis=1))
+
+
+def parameter_vector(system: SurfaceSystem, c: dict[str, float]) -> Traced:
+    """The constants in the system's order."""
+    return jnp.asarray([c[name] for name in system.parameters])
+
+
+Point = tuple[Traced, Traced, Traced, Traced, Traced]
+"""dy, y, algebraic, scalars, dq: what the system takes at a point."""
+
+
+@cache
+def compiled(kind: str) -> Callable[..., dict[str, Any]]:
+    """Rows of the first-order system, dR/dw, d/du(dR/dw') - dR/dw, and the species' balance, at one point each."""
+    system = SYSTEMS[kind]
+
+    def at(here: Point, ahead: Point, u: Traced, p: Traced) -> dict[str, Any]:
+        (force, _), (_, fluxes) = jax.jvp(lambda *x: system.variation(*x, p), here, ahead)
+        found = {"rows": system.equations(*here, u, p), "force": force}
+        found["balance"] = jax.tree.map(jnp.subtract, fluxes, force)
+        if system.species is not None:
+            species = system.species(system.named(p))
+
+            def carried(dy: Traced, y: Traced, _: Traced, s: Traced, dq: Traced) -> Traced:
+                return species.flux(system.site(dy, y, s, dq), system.field_values(dy)["c"])
+
+            dy, y, _, s, dq = here
+            source = species.source(system.site(dy, y, s, dq), u)
+            found["species"] = jax.jvp(carried, here, ahead)[1] + dq[4] - source
+        return found
+
+    return jax.jit(jax.vmap(at, in_axes=(0, 0, 0, None)))
+
+
+def derived(kind: str, q: Series, u: Array, c: dict[str, float]) -> dict[str, Any]:
+    """What the system makes of a state with h' = 0; z is stored in the frame that moves at v0."""
+    system = SYSTEMS[kind]
+    y, w = stack(q, system.fields), stack(q, ("r_t", "z_t", "psi_t", "h_t", "amount_t"))
+    if "v0" in system.scalars:
+        w = w.at[:, 1, 0].add(-c["v0"])
+    gamma = stack(q, ("gamma",))
+    s = jnp.tile(jnp.asarray([{**c, "h": q["h"][0, 0]}[name] for name in system.scalars]), (POINTS, 1))
+    here = (y[..., 1], y[..., 0], gamma[..., 0], s, w[..., 0])
+    ahead = (2 * y[..., 2], y[..., 1], gamma[..., 1], 0 * s, w[..., 1])
+    return jax.device_get(compiled(kind)(here, ahead, jnp.asarray(u), parameter_vector(system, c)))
+
+
+def assert_agree(found: Any, expected: Any, size: Any = 0.0) -> None:
+    """Equal to TOLERANCE of the largest of the values, of `size` and of 1."""
+    scale = max(1.0, float(np.max(np.abs(expected))), float(np.max(np.abs(size))))
+    np.testing.assert_allclose(np.asarray(found), np.asarray(expected), rtol=0, atol=TOLERANCE * scale)
+
+
+@pytest.fixture(params=[(kind, seed) for kind in SYSTEMS for seed in SEEDS], ids=str)
+def states(request: pytest.FixtureRequest) -> tuple[str, Case, Array, dict[str, Any]]:
+    """A state with h' = 0 in the paper's terms, its points, and what the derived system makes of it."""
+    kind, seed = request.param
+    q, u = random_series(seed, uniform_length=True)
+    c = random_parameters(SYSTEMS[kind], seed)
+    return kind, make_case(kind, q, c), u, derived(kind, q, u, c)
+
+
+def test_first_order_system(states):
+    """Every row but the species': (dur, duz, vardpsidt, alphaprime, betaprime, Tuu, Tup, divTu, divTp, divvexp)."""
+    kind, (s, f, m, at, _), _, found = states
+    td, (cot, _), rh = paper.dissipative_tension(s, f, m), paper.cotangent(s), s.r * s.h
+    coat = paper.f_kappa(s, m)["C0"] * s.dC0 * s.r
+    expected = [
+        0 * s.r,
+        at["dz"] + s.h * np.sin(s.psi),
+        at["moment"] - paper.moment(s, m),
+        at["dmoment"] - paper.moment_prime(s, m, at["alpha"], at["beta"]),
+        at["dalpha"] - paper.alpha_prime(s, f, m),
+        at["dbeta"] - paper.beta_prime(s, f, m),
+        at["meridional_force"] - s.r * (td.uu + m.gamma),
+        at["dmeridional_force"] - ((td.pp + m.gamma) * cot + m.friction * f.v_u - m.f_u) * rh + coat,
+        at["azimuthal_force"] - s.r * td.up,
+        at["dazimuthal_force"] + (td.up * cot - m.friction * f.v_phi + m.f_phi) * rh,
+    ]
+    if kind == "open":
+        expected += [0 * s.r, paper.divergence(s, f)]
+    for row, value in zip(found["rows"].T, expected, strict=kind == "open"):
+        assert_agree(row, value)
+
+
+def test_meridional_and_azimuthal_balance(states):
+    """P' - dR/dw = r h times (varivu), and (vphi) with eta_s and the sign of its Euler-Lagrange line corrected."""
+    _, (s, f, m, _, _), _, found = states
+    rh = s.r * s.h
+    assert_agree(found["balance"].meridional_velocity, rh * paper.meridional_balance(s, f, m))
+    assert_agree(found["balance"].azimuthal_velocity, rh * paper.azimuthal_balance(s, f, m))
+
+
+def test_moment_balance_gives_the_second_derivative_of_the_angle(states):
+    """P_psi' - dR/dpsi_t = (kappa r/h) (psi'' - the paper's psi'') by (vardpsidt)."""
+    _, (s, _, m, at, _), _, found = states
+    assert_agree(found["balance"].psi, m.kappa * s.r / s.h * (at["ddpsi"] - paper.ddpsi(s, m, at["alpha"], at["beta"])))
+
+
+def test_length_balance(states):
+    """dR/dh_t is zeta' by (vardhdt)."""
+    _, (s, _, m, at, _), _, found = states
+    assert_agree(found["force"].h, paper.zeta_prime(s, m, at["alpha"], at["beta"]))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_multipliers_of_the_paper_solve_the_constrained_equations(kind: str, seed: int):
+    """With (alpha, beta): zeta' = 0, psi'' is the state's own, the tangential combination of the equations for alpha' and
+    beta' holds on any shape (hence zeta'' = 0), and the other one is r h (n . div T + f_n), also as (betaprime2)."""
+    q, u = random_series(seed, uniform_length=True)
+    c = random_parameters(SYSTEMS[kind], seed)
+    s, f, m, _, _ = make_case(kind, q, c)
+    for name, value, first in zip(("alpha", "beta"), paper.multipliers(s, m), paper.multiplier_slopes(s, m), strict=True):
+        q[name] = np.array([value, first, *np.zeros((ORDER - 1, POINTS))])
+    found = derived(kind, q, u, c)
+    sin, cos, rh, size = np.sin(s.psi), np.cos(s.psi), s.r * s.h, np.abs(q["alpha"][:2]).max()
+    assert_agree(found["force"].h, 0 * sin, size)
+    assert_agree(found["balance"].psi, 0 * sin, size)
+    radial, axial = found["rows"].T[4:6]
+    assert_agree(radial * cos - axial * sin, 0 * sin, size)
+    assert_agree(radial * sin + axial * cos, rh * paper.normal_balance(s, f, m), size)
+    assert_agree(axial, rh * cos * paper.beta_balance(s, f, m), size)
