@@ -14,6 +14,7 @@ from shapespace.base.outcome import Outcome
 from shapespace.models import open_membrane
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.newton import Newton
+from shapespace.numerics.state import State
 from shapespace.study.engine import Engine
 from shapespace.study.observables import measure
 from shapespace.study.scenario import scenario
@@ -27,7 +28,7 @@ TIGHT = Newton(1e-11)
 @functools.cache
 def division() -> tuple[Engine, list[Moment]]:
     """Guided division until ingression sets in, on a mesh that moves: about 50 steps."""
-    engine = Engine.of(scenario("guided-division", elements=40, mesh_tolerance=1e-3))
+    engine = Engine.of(scenario("guided-division", elements=40, mesh_tolerance=1e-5))
     evolution = Evolution([start_of(engine)], engine.p, 0.07, Stepping(tolerance=3e-4))
     moments = list(evolution)
     assert evolution.outcome is Outcome.REACHED_END
@@ -35,7 +36,7 @@ def division() -> tuple[Engine, list[Moment]]:
     return engine, moments
 
 
-def state_of(moment: Moment):
+def state_of(moment: Moment) -> State:
     assert isinstance(moment.problem, CollocationProblem)
     return moment.problem.unpack(moment.x)
 
@@ -99,17 +100,17 @@ def test_regulator_balance(turnover_rate: float):
         assert drift < 1e-12, f"relative drift of the total {drift:.1e}"
 
 
-def energy_miss(engine: Engine, order: int, steps: int, until: float) -> float:
+def energy_miss(engine: Engine, order: int, steps: int, until: float, state: State | None = None) -> float:
     """dF/dt + 2 D - external - chemical power at the end of a run with fixed steps, relative to 2 D.
 
     dF/dt is the backward difference, of the scheme's order, of the energies of the last states.
     """
-    moments, outcome = march(engine, until, order=order, fixed_step=until / steps, newton=TIGHT)
+    moments, outcome = march(engine, until, state=state, order=order, fixed_step=until / steps, newton=TIGHT)
     assert outcome is Outcome.REACHED_END
     last = moments[: -order - 2 : -1]
     measured = [measure(engine, m.x, m.rate or resting(engine, m.x)) for m in last]
     change = derivative_weights(np.array([m.time for m in last])) @ [values["energy"] for values in measured]
-    supply = measured[0]["chemical_power"] + measured[0]["external_power"]
+    supply = measured[0].get("chemical_power", 0.0) + measured[0]["external_power"]
     return float(abs(change + measured[0]["dissipation"] - supply) / measured[0]["dissipation"])
 
 
@@ -130,7 +131,10 @@ def test_energy_law_closes_to_the_order_of_time(order: int, counts: tuple[int, .
 def test_energy_law_of_the_open_membrane(order: int):
     """A membrane that rises under a pull and draws area from its reservoir, whose work is booked as external."""
     engine = make_engine("membrane-protrusion", pulling_force=20.0)
-    check_order([energy_miss(engine, order, steps, 0.01) for steps in (20, 40, 80)], order, margin=0.25)
+    # The flat disc buckles like the root of time, which no fixed step resolves: start when it has risen a little.
+    risen = state_of(march(engine, 0.005, tolerance=1e-4)[0][-1])
+    misses = [energy_miss(engine, order, steps, 0.01, risen) for steps in (20, 40, 80)]
+    check_order(misses, order, margin=0.25)
 
 
 def friction_force(engine: Engine, x: Array) -> tuple[float, float]:

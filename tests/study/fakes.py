@@ -28,7 +28,7 @@ def make_frame(number: int, step: float = 0.1, elements: int = 60) -> Frame:
         algebraic=random.normal(size=(elements, 4, 2)),
         scalars=random.normal(size=3),
         rates=random.normal(size=(elements, 4, 4)),
-        observables={"time": number * step, "height": 2.0 + 0.1 * number, "neck_radius": 1.0 / (1 + number)},
+        observables={"height": 2.0 + 0.1 * number, "neck_radius": 1.0 / (1 + number)},
     )
 
 

@@ -34,7 +34,7 @@ def test_run_stores_every_frame_and_its_outcome(tmp_path: Path, fake: type[FakeS
     store = RunStore.open(tmp_path / "run")
     assert (result.outcome, result.steps, result.store) == (Outcome.REACHED_END, STEPS, tmp_path / "run")
     assert (len(store), store.outcome) == (STEPS + 1, Outcome.REACHED_END)
-    assert result.observables == store.read(-1).observables
+    assert result.observables == {"time": 1.0, **store.read(-1).observables}
     assert result.wall_time >= 0
     assert seen == [(n, n + 1) for n in range(STEPS + 1)]
 

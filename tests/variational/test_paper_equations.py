@@ -1,12 +1,13 @@
 """The equations derived by differentiation of one density agree with the paper's explicit ones, on arbitrary states.
 
-A state is a set of random Taylor polynomials in u about random points, with r' = h cos(psi), a' = r h and rates that keep
-these, and nothing else: no balance holds, so whole expressions are compared, not zeros.
+A state is a set of random Taylor polynomials in u about random points, with r' = h cos(psi), a' = r h and rates that
+keep these, and nothing else: no balance holds, so whole expressions are compared, not zeros.
 """
 
 from collections.abc import Callable
 from functools import cache
 from math import factorial
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import jax
@@ -19,9 +20,14 @@ from shapespace.base.arrays import Array, Traced
 from shapespace.geometry.curve import Geometry
 from shapespace.geometry.motion import Rates, coordinate_flow
 from shapespace.geometry.parameterization import eulerian_rates, lagrangian_rates
+from shapespace.models import open_membrane
 from shapespace.models.closed_surface import make_closed_surface
 from shapespace.models.open_membrane import make_open_membrane
-from shapespace.physics.term import Site
+from shapespace.physics.activity import ActiveTension
+from shapespace.physics.force import Pressure
+from shapespace.physics.tension import Incompressibility
+from shapespace.physics.term import AbstractTerm, Site
+from shapespace.physics.viscosity import BulkViscosity
 from shapespace.variational.rayleighian import density
 from shapespace.variational.surface import SurfaceSystem
 
@@ -30,6 +36,7 @@ SEEDS = (0, 1, 2)
 POINTS = 40
 ORDER = 6
 TOLERANCE = 1e-10
+CHEAP = {"xla_backend_optimization_level": 0}  # run a few times each: compiling costs more than computing
 
 FREE = ("h", "psi", "z", "r_t", "z_t", "v", "v_phi", "c", "c_t", "gamma", "moment", "alpha", "beta")
 FLUXES = ("meridional_force", "azimuthal_force", "species_flux")
@@ -162,18 +169,19 @@ def compiled(kind: str) -> Callable[..., dict[str, Any]]:
         (force, _), (_, fluxes) = jax.jvp(lambda *x: system.variation(*x, p), here, ahead)
         found = {"rows": system.equations(*here, u, p), "force": force}
         found["balance"] = jax.tree.map(jnp.subtract, fluxes, force)
+        dy, y, _, s, dq = here
+        found["ends"] = system.end_conditions(y, y, s, dq, dq, p)
         if system.species is not None:
             species = system.species(system.named(p))
 
             def carried(dy: Traced, y: Traced, _: Traced, s: Traced, dq: Traced) -> Traced:
                 return species.flux(system.site(dy, y, s, dq), system.field_values(dy)["c"])
 
-            dy, y, _, s, dq = here
             source = species.source(system.site(dy, y, s, dq), u)
             found["species"] = jax.jvp(carried, here, ahead)[1] + dq[4] - source
         return found
 
-    return jax.jit(jax.vmap(at, in_axes=(0, 0, 0, None)))
+    return jax.jit(jax.vmap(at, in_axes=(0, 0, 0, None)), compiler_options=CHEAP)
 
 
 def derived(kind: str, q: Series, u: Array, c: dict[str, float]) -> dict[str, Any]:
@@ -250,12 +258,14 @@ def test_length_balance(states):
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("kind", SYSTEMS)
 def test_multipliers_of_the_paper_solve_the_constrained_equations(kind: str, seed: int):
-    """With (alpha, beta): zeta' = 0, psi'' is the state's own, the tangential combination of the equations for alpha' and
-    beta' holds on any shape (hence zeta'' = 0), and the other one is r h (n . div T + f_n), also as (betaprime2)."""
+    """With (alpha, beta): zeta' = 0, psi'' is the state's own, the tangential combination of the equations for alpha'
+    and beta' holds on any shape (hence zeta'' = 0), the other one is r h (n . div T + f_n), also as (betaprime2)."""
     q, u = random_series(seed, uniform_length=True)
     c = random_parameters(SYSTEMS[kind], seed)
     s, f, m, _, _ = make_case(kind, q, c)
-    for name, value, first in zip(("alpha", "beta"), paper.multipliers(s, m), paper.multiplier_slopes(s, m), strict=True):
+    for name, value, first in zip(
+        ("alpha", "beta"), paper.multipliers(s, m), paper.multiplier_slopes(s, m), strict=True
+    ):
         q[name] = np.array([value, first, *np.zeros((ORDER - 1, POINTS))])
     found = derived(kind, q, u, c)
     sin, cos, rh, size = np.sin(s.psi), np.cos(s.psi), s.r * s.h, np.abs(q["alpha"][:2]).max()
@@ -265,3 +275,131 @@ def test_multipliers_of_the_paper_solve_the_constrained_equations(kind: str, see
     assert_agree(radial * cos - axial * sin, 0 * sin, size)
     assert_agree(radial * sin + axial * cos, rh * paper.normal_balance(s, f, m), size)
     assert_agree(axial, rh * cos * paper.beta_balance(s, f, m), size)
+
+
+def test_species_balance_is_the_advective_one(states):
+    """N' + d(c r h)/dt - source = r h (dc/dt - the paper's dc/dt) by (cdt, quryv, divvexp, c0dyn)."""
+    kind, (s, f, _, at, c), u, found = states
+    if kind == "closed":
+        reference = paper.ring(c["reference_concentration"], c["ring_amplitude"], c["ring_width"], u)
+        species = paper.Species(at["c"], at["dc"], at["ddc"], c["diffusivity"], c["turnover_rate"], reference)
+        q = paper.coordinate_flow(s, f, at["r_t"], at["z_t"])
+        assert_agree(found["species"], s.r * s.h * (at["c_t"] - paper.concentration_rate(s, f, q, species)))
+
+
+def test_end_conditions(states):
+    """(Table 4) and the gauge; the rim's gamma_H = gamma_0 through P_v with S_uu = -S_phiphi."""
+    kind, (s, f, m, at, c), _, found = states
+    n, cap = at["species_flux"], s.psi - np.pi
+    if kind == "closed":
+        expected = [s.r, s.r, at["beta"], at["beta"], s.psi, cap, f.v_u, f.v_u, f.v_phi, f.v_phi, n, n]
+        expected += [at["alpha"], 2 * at["z"]]
+    else:
+        force = s.r * (c["boundary_tension"] - 2 * m.eta_s * paper.strain_rate(s, f)[1])
+        expected = [
+            s.r,
+            s.r - c["base_radius"],
+            at["beta"],
+            at["z"],
+            s.psi,
+            s.psi,
+            f.v_u,
+            at["meridional_force"] - force,
+        ]
+        expected += [f.v_phi, f.v_phi, at["alpha"], at["area"]]
+    for row, value in zip(found["ends"].T, expected, strict=True):
+        assert_agree(row, value)
+
+
+Parameterization = Callable[[Geometry, Traced, Traced], Rates]
+PARAMETERIZATIONS: dict[str, Parameterization] = {
+    "eulerian": lambda g, v, dv: eulerian_rates(g, v[0], dv[0], v[1], v[2]),
+    "lagrangian": lambda g, v, dv: lagrangian_rates(g, v[0], dv[0], v[1], dv[1], v[2]),
+}
+SHAPE, VELOCITY = ("r", "psi", "dpsi", "h", "area", "c", "gamma"), ("v_n", "v", "v_phi")
+
+
+def taylor(coefficients: Traced, x: Traced) -> Traced:
+    """Values of the polynomials with the coefficients (fields, terms) at the distance x, exact to x^3."""
+    return coefficients[:, 0] + x * (coefficients[:, 1] + x * (coefficients[:, 2] + x * coefficients[:, 3]))
+
+
+def all_terms(c: dict[str, float], gamma: Traced) -> tuple[AbstractTerm, ...]:
+    """The terms of both models and the constraints, each once."""
+    p = SimpleNamespace(**c)
+    activity = ActiveTension(p.active_tension, p.saturation_concentration)
+    constraints = (BulkViscosity(p.bulk_viscosity), Pressure(p.p), Incompressibility(gamma))
+    return (*open_membrane.terms(p), activity, *constraints)
+
+
+@cache
+def unconstrained(parameterization: str) -> Callable[..., tuple[Traced, ...]]:
+    """Euler-Lagrange expressions of the density over (v_n, v_u, v_phi); dR/dv and dR/dv' - [dR/dv'']'."""
+    rates_of = PARAMETERIZATIONS[parameterization]
+
+    def at(shape: Traced, velocity: Traced, c: dict[str, Traced]) -> tuple[Traced, ...]:
+        def power(jet: Traced, x: Traced) -> Traced:
+            def moved(e: Traced) -> Rates:
+                v, dv = jet[:, 0] + e * jet[:, 1] + e**2 / 2 * jet[:, 2], jet[:, 1] + e * jet[:, 2]
+                return rates_of(Geometry(*taylor(shape[:5], x + e)), v, dv)
+
+            rates, gradients = jax.jvp(moved, (jnp.zeros(()),), (jnp.ones(()),))
+            *here, concentration, gamma = taylor(shape, x)
+            return density(all_terms(c, gamma), Site(Geometry(*here), rates, gradients, concentration))
+
+        def momenta(x: Traced) -> Traced:
+            jet = jnp.stack([taylor(v, x) for v in velocity], axis=1)
+            return jax.grad(power)(jet, x)
+
+        def slopes(x: Traced) -> tuple[Traced, Traced]:
+            return jax.jvp(momenta, (x,), (jnp.ones(()),))
+
+        (value, first), (_, second) = jax.jvp(slopes, (jnp.zeros(()),), (jnp.ones(()),))
+        return value[:, 0] - first[:, 1] + second[:, 2], value[:, 0], value[:, 1] - first[:, 2]
+
+    return jax.jit(jax.vmap(at, in_axes=(0, 0, None)), compiler_options=CHEAP)
+
+
+@pytest.mark.parametrize("parameterization", PARAMETERIZATIONS)
+def test_force_balance_in_other_parameterizations(parameterization: str):
+    """Where h depends on u: variation over v_n gives -r h (n . div T + f_n) with (divTen), over v_u and v_phi the
+    tangential balances; for Eulerian points also (dRdvn) times r h, less f_n, and (dRddvn) with its sign corrected."""
+    q, _ = random_series(7, uniform_length=False)
+    c = {name: value for system in SYSTEMS.values() for name, value in random_parameters(system, 7).items()}
+    (s, f, m, _, _), closed = make_case("open", q, c), make_case("closed", q, c).material
+    m = m._replace(eta_b=closed.eta_b, active=closed.active, dactive=closed.dactive, f_n=m.f_n + c["p"])
+    velocity = [stack(q, VELOCITY)]
+    for _ in range(2):
+        velocity.append(jnp.pad(velocity[-1][..., 1:] * jnp.arange(1, ORDER + 1), ((0, 0), (0, 0), (0, 1))))
+    coefficients = stack(q | {"dpsi": slope(q["psi"])}, SHAPE), jnp.stack(velocity, axis=1)
+    balance, first, second = (np.asarray(x) for x in unconstrained(parameterization)(*coefficients, c))
+    rh, te, td = s.r * s.h, paper.equilibrium_tension(s, m), paper.dissipative_tension(s, f, m)
+    assert_agree(balance[:, 0], -rh * paper.normal_balance(s, f, m))
+    assert_agree(balance[:, 1], -rh * paper.meridional_balance(s, f, m))
+    assert_agree(balance[:, 2], -rh * paper.azimuthal_balance(s, f, m))
+    if parameterization == "eulerian":
+        cu, cp = paper.c_uu(s)[0], paper.c_pp(s)[0]
+        assert_agree(first[:, 0], rh * (cu * (te.uu + td.uu) + cp * (te.pp + td.pp) - m.f_n))
+        assert_agree(second[:, 0], s.r * te.n)
+
+
+def test_rates_of_the_parameterizations():
+    """Eulerian and Lagrangian rates, and any in between, against (dtr, dtz, dth, dtpsi, dtpsipr corrected)."""
+    q, _ = random_series(8, uniform_length=False)
+    s, f, _, at, _ = make_case("open", q, random_parameters(SYSTEMS["open"], 8))
+    g = Geometry(s.r, s.psi, s.dpsi, s.h, at["area"])
+    zero = np.zeros(POINTS)
+    w, dw = f.v_u / s.h, f.dv_u / s.h - f.v_u * s.dh / s.h**2
+    for found, expected in (
+        (eulerian_rates(g, f.v_n, f.dv_n, f.v_u, f.v_phi), paper.kinematics(s, f, zero, zero)),
+        (lagrangian_rates(g, f.v_n, f.dv_n, f.v_u, f.dv_u, f.v_phi), paper.kinematics(s, f, w, dw)),
+    ):
+        for name in ("r", "z", "psi", "h"):
+            assert_agree(getattr(found, name), expected[name])
+        assert_agree(coordinate_flow(g, found), s.h * paper.coordinate_flow(s, f, expected["r"], expected["z"]))
+    sin, cos = sine_and_cosine(q["psi"])
+    slip = product(reciprocal(q["h"]), product(cos, q["r_t"]) - product(sin, q["z_t"]))
+    found = paper.kinematics(s, f, slip[0], slip[1])
+    for name in ("r", "z", "psi", "h"):
+        assert_agree(found[name], at[name + "_t"])
+    assert_agree(found["c_uu"], at["dpsi_t"] / s.h - s.dpsi * at["h_t"] / s.h**2)

@@ -24,17 +24,17 @@ START_LIMIT = 4.0**7
 class Stepping:
     """Options of time stepping.
 
-    order: 1 is backward Euler, 2 the default. fixed_step: 0 for error control at `tolerance` (local error of the stored
+    order: of the backward differentiation; 1 is backward Euler. fixed_step: 0 for error control at `tolerance` (local error of the stored
     quantities per step, relative), else the step length. first_step: the first, which no estimate can control. min_step: below it the
     run ends in step-underflow. stationary_rate: largest relative rate of change of a state that counts as stationary.
     """
 
-    order: int = 2
+    order: int = 3
     fixed_step: float = 0.0
     tolerance: float = 1e-4
     first_step: float = 1e-6
     min_step: float = 1e-12
-    max_growth: float = 2.0
+    max_growth: float = 1.5
     stationary_rate: float = 1e-6
     max_steps: int = 20_000
 

@@ -110,9 +110,9 @@ class RunSettings(Record):
 class Numerics(Record):
     """The discretisation."""
 
-    elements: Annotated[int, AfterValidator(_is_element_count)] = 60
+    elements: Annotated[int, AfterValidator(_is_element_count)] = 40
     degree: Annotated[int, Field(ge=2, le=6)] = 4
-    mesh_tolerance: Positive = 1e-6
+    mesh_tolerance: Positive = 1e-5
     azimuthal_flow: bool = False
 
 

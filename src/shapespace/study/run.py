@@ -73,15 +73,15 @@ def run(
         frames: list[Frame] = []
         outcome = _simulate(scenario, [], 0, frames.append, progress)
         return Run(
-            outcome, scenario, None, frames[-1].observables, len(frames) - 1, perf_counter() - start, tuple(frames)
+            outcome, scenario, None, _observables(frames[-1]), len(frames) - 1, perf_counter() - start, tuple(frames)
         )
     begin = RunStore.resume if resume and holds_run(out) else RunStore.create
     with begin(out, scenario) as store:
         if ready is not None:
             ready(len(store))
         outcome = _advance(store, progress)
-        last = store.read(-1)
-        return Run(outcome, store.scenario, store.path, last.observables, len(store) - 1, perf_counter() - start)
+        last = _observables(store.read(-1))
+        return Run(outcome, store.scenario, store.path, last, len(store) - 1, perf_counter() - start)
 
 
 def free_path(name: str, root: str | Path = "results") -> Path:
@@ -91,6 +91,10 @@ def free_path(name: str, root: str | Path = "results") -> Path:
         number += 1
         path = Path(root) / f"{name}-{number}"
     return path
+
+
+def _observables(frame: Frame) -> dict[str, float]:
+    return {"time": frame.time, **frame.observables}
 
 
 def _advance(store: RunStore, progress: Progress | None) -> Outcome:

@@ -14,7 +14,16 @@ from matplotlib.patches import Rectangle
 
 from shapespace.view import panels, style
 from shapespace.view.frames import Profile, Run, observable, progress_measure, read_run, snapshot_frames
-from shapespace.view.snapshot import Camera, SnapshotArtists, arrow_flows, extent, fastest_flow, make_camera, offset_of
+from shapespace.view.snapshot import (
+    Camera,
+    SnapshotArtists,
+    arrow_flows,
+    extent,
+    fastest_flow,
+    make_camera,
+    offset_of,
+    swim_arrow,
+)
 
 SNAPSHOTS = 5
 Limits = tuple[float, float, float, float]  # left, right, bottom, top
@@ -39,7 +48,7 @@ class Layout:
 _LAYOUTS = {
     "membrane-protrusion": Layout("height", twin=panels.GROWTH),
     "ring-slipping": Layout("ring_position", twin="velocity", with_swim=True),
-    "polar-swimmer": Layout("ring_position", twin="velocity", with_swim=True),
+    "polar-swimmer": Layout("velocity", twin="ring_position", with_swim=True),
     "guided-division": Layout("equator_radius", words="neck radius", with_inset=True),
 }
 _GENERIC_CURVES = ("equator_radius", "height", "neck_radius", "ring_position", "length", "area", "velocity")
@@ -122,7 +131,10 @@ def common_limits(profiles: Sequence[Profile], cameras: Sequence[Camera], *, wit
     """(left, right, bottom, top) that hold every snapshot with its arrows, and a strip below for the keys."""
     pairs = zip(profiles, cameras, strict=True)
     extents = np.array([extent(p, camera, offset_of(camera, p), with_swim=with_swim) for p, camera in pairs])
-    strip = 0.42 * cameras[0].size
+    size = cameras[0].size
+    strip = 0.42 * size
+    if with_swim and cameras[0].swim_scale > 0:  # for the numbers beyond the tips of the arrows
+        extents[:, 2:] += np.array([-0.25, 0.25]) * size
     half = float(np.abs(extents[:, :2]).max())
     return -half, half, float(extents[:, 2].min()) - strip, float(extents[:, 3].max())
 
@@ -156,7 +168,7 @@ def _draw_snapshots(
         axes.set_title(f"$\\bf{{{number}}}$   {stamp}", pad=3)
         if layout.with_swim:
             label_speed(axes, run, camera, profile)
-        if one_scale and number == 1 or not one_scale and _flows(profile, camera):
+        if (one_scale and number == 1) or (not one_scale and _flows(profile, camera)):
             draw_arrow_key(axes, run, camera, limits)
     camera = cameras[0]
     draw_length_key(row[1] if one_scale else row[0], run, camera, limits)
@@ -193,14 +205,14 @@ def draw_colour_bar(part: Figure | SubFigure, axes: Axes, run: Run, camera: Came
 
 
 def label_speed(axes: Axes, run: Run, camera: Camera, profile: Profile) -> None:
-    """The swimming speed in green beside its arrow; nothing where the arrow is too short to be drawn."""
+    """The swimming speed in green beyond the tip of its arrow; nothing where the arrow is too short to be drawn."""
     if abs(profile.swim) * camera.swim_scale < camera.shortest_swim:
         return
-    ahead = profile.axial.max() if profile.swim > 0 else profile.axial.min()
-    y = (ahead - profile.centre) * np.cos(camera.elevation) + 0.5 * camera.swim_scale * profile.swim
-    y += np.sign(profile.swim) * 0.15 * camera.size
+    tail, vector = swim_arrow(profile, camera, offset_of(camera, profile))
+    x, y = (tail + vector)[0]
     text = f"{style.number(abs(profile.swim), 2)} {style.units_of(run.dataset['velocity'])}"
-    axes.text(0.14 * camera.size, y, text, color=style.GREEN, va="center", ha="left")
+    side, va = (-1, "top") if profile.swim < 0 else (1, "bottom")
+    axes.text(x, y + 0.08 * side * camera.size, text, color=style.GREEN, va=va, ha="center")
 
 
 def draw_arrow_key(axes: Axes, run: Run, camera: Camera, limits: Limits) -> None:

@@ -188,7 +188,7 @@ class Scene:
         return curve
 
     def _draw_flow_key(self, surface: Axes) -> Text | None:
-        """A reference arrow; where its speed changes in the course of the movie, the text that says it, on the moving figure."""
+        """A reference arrow; where its speed changes in the course of the movie, the text that will say it."""
         if np.ptp(self._flows) == 0:
             draw_arrow_key(surface, self._run, self._camera, self._limits)
             return None

@@ -13,7 +13,7 @@ from shapespace.view.frames import Array, Profile, Run, observable, progress_mea
 GROWTH = "growth speed"  # not an observable: the normal velocity of the apex
 _OWN_SCALE_FACTOR = 4.0  # panels of one row get their own scales where their ranges differ by more
 _EARLY = 0.03  # part of the run's time
-_REST = 0.01  # values below this part of a row's largest are at rest: not magnified
+_REST = 0.01  # velocities below this part of the row's largest are rest: not magnified
 _INSET_FACTOR = 8.0  # a peak this much above its surroundings is shown enlarged
 
 VELOCITIES = (("tangential_velocity", style.RED, "-"), ("normal_velocity", style.BLUE, (0, (4, 1.2))))
@@ -21,19 +21,29 @@ CURVATURES = (("azimuthal_curvature", style.PURPLE, "-"), ("meridional_curvature
 
 
 def draw_curve(axes: Axes, run: Run, name: str, words: str, twin: str | None, marked: Sequence[int]) -> None:
-    """An observable over time in blue, numbered dots at the `marked` frames, and a second series on the right axis."""
-    values = observable(run.dataset, name)
-    axes.plot(run.time, values, color=style.BLUE, zorder=3)
-    axes.plot(run.time[marked], values[marked], "o", color=style.BLUE, markersize=4, markeredgecolor="white", zorder=4)
+    """An observable over time, numbered dots at the `marked` frames, and a second series on the right axis."""
+    values, colour = observable(run.dataset, name), colour_of(name)
+    axes.plot(run.time, values, color=colour, zorder=3)
+    axes.plot(run.time[marked], values[marked], "o", color=colour, markersize=4, markeredgecolor="white", zorder=4)
     axes.set_xlabel(style.axis_label(run.dataset["time"], words="time"))
-    axes.set_ylabel(style.axis_label(run.dataset[name], words=words or name.replace("_", " ")), color=style.BLUE)
-    axes.tick_params(axis="y", labelcolor=style.BLUE)
+    axes.set_ylabel(style.axis_label(run.dataset[name], words=words or words_of(name)), color=colour)
+    axes.tick_params(axis="y", labelcolor=colour)
     _scale_time(axes, run, values)
     axes.margins(x=0.015, y=0.12)
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
-    _number_dots(axes, run.time, values, marked)
+    _number_dots(axes, run.time, values, marked, colour)
     if twin is not None:
         _draw_twin(axes, run, twin)
+
+
+def colour_of(name: str) -> str:
+    """Growth in red as the flow arrows, swimming in green as its arrow, all else in blue."""
+    return {GROWTH: style.RED, "velocity": style.GREEN}.get(name, style.BLUE)
+
+
+def words_of(name: str) -> str:
+    """An observable in words."""
+    return "swimming speed" if name == "velocity" else name.replace("_", " ")
 
 
 def _scale_time(axes: Axes, run: Run, values: Array) -> None:
@@ -45,8 +55,9 @@ def _scale_time(axes: Axes, run: Run, values: Array) -> None:
         axes.set_xscale("symlog", linthresh=linear, linscale=0.6)
 
 
-def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int]) -> None:
+def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int], colour: str) -> None:
     """Numbers beside the dots, on the side away from the curve's bend: above where it is concave, else below."""
+    close = 0.02  # of the width: the number of the dot before would be in the way
     span = float(np.ptp(values)) or 1.0
     place = axes.transScale.transform(np.stack([time, values], -1))[:, 0]
     width = float(place[-1] - place[0])
@@ -58,6 +69,8 @@ def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int]) 
         bend = 1.0 if at_end or values[k] >= 0.5 * (before + after) - 1e-3 * span else -1.0
         if abs(slope) > 1:  # steep: always to the right
             bend = 1.0 if normal[0] > 0 else -1.0
+        elif number > 1 and place[k] - place[marked[number - 2]] < close * width and not at_end:
+            bend = -bend
         label = axes.annotate(
             str(number),
             (time[k], values[k]),
@@ -66,7 +79,7 @@ def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int]) 
             ha="center",
             va="center",
             fontweight="bold",
-            color=style.BLUE,
+            color=colour,
             fontsize=8,
             zorder=5,
         )
@@ -74,19 +87,18 @@ def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int]) 
 
 
 def _draw_twin(axes: Axes, run: Run, twin: str) -> None:
-    """A second series on the right: growth speed in red as the flow arrows, another in green as the swimming arrow."""
+    """A second series on the right axis."""
     right = axes.twinx()
     right.spines["right"].set_visible(True)
     if twin == GROWTH:
-        values, colour = run.fields["normal_velocity"][:, 0].copy(), style.RED
+        values = run.fields["normal_velocity"][:, 0].copy()
         if not run.fields["normal_velocity"][0].any():
             values[0] = np.nan  # the initial state has no velocity yet: it is given, not solved for
         text = f"growth speed ({style.units_of(run.dataset['normal_velocity'])})"
     else:
-        values, colour = observable(run.dataset, twin), style.GREEN
-        text = style.axis_label(
-            run.dataset[twin], words="swimming speed" if twin == "velocity" else twin.replace("_", " ")
-        )
+        values = observable(run.dataset, twin)
+        text = style.axis_label(run.dataset[twin], words=words_of(twin))
+    colour = colour_of(twin)
     right.plot(run.time, values, color=colour, linestyle=(0, (4, 1.2)), zorder=2)
     right.set_ylabel(text, color=colour)
     right.tick_params(axis="y", labelcolor=colour)
@@ -109,16 +121,17 @@ def draw_profiles(
         axes.set_xticks([0, 0.5, 1], ["0", "0.5", "1"])
         axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10], min_n_ticks=3))
     size = float(run.fields["radius"].max())
-    ranges = [_range(profile, variables, 1.0 / size if words == "curvature" else 0.0) for profile in profiles]
+    least, rest = (1.0 / size, 0.0) if words == "curvature" else (0.0, _REST)
+    ranges = [_range(profile, variables, least) for profile in profiles]
     common = min(low for low, _ in ranges), max(high for _, high in ranges)
     widths = np.array([high - low for low, high in ranges])
-    seen = widths > _REST * widths.max()
+    seen = widths > rest * widths.max()
     apart = bool(seen.any()) and widths.max() > _OWN_SCALE_FACTOR * widths[seen].min()
     for k, (axes, (low, high)) in enumerate(zip(row, ranges, strict=True)):
         if not apart:
             low, high = common
         elif not seen[k]:
-            low, high = _REST * common[0], _REST * common[1]
+            low, high = rest * common[0], rest * common[1]
         pad = 0.08 * (high - low) or 1.0
         axes.set_ylim(low - pad, high + pad)
         axes.tick_params(labelleft=apart or k == 0)
