@@ -27,7 +27,7 @@ def make_frame(number: int, step: float = 0.1, elements: int = 60) -> Frame:
         slopes=random.normal(size=(elements, 4, 12)),
         algebraic=random.normal(size=(elements, 4, 2)),
         scalars=random.normal(size=3),
-        rates=random.normal(size=(elements, 4, 4)),
+        rates=random.normal(size=(elements, 4, 2)).astype(np.float32).astype(np.float64),
         observables={"height": 2.0 + 0.1 * number, "neck_radius": 1.0 / (1 + number)},
     )
 

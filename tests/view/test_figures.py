@@ -28,7 +28,7 @@ CURVES = {
     "membrane-protrusion": ("height $d$ ($R_{b}$)", "growth speed ($R_{b}/\\tau$)"),
     "ring-slipping": ("ring position $u_m$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
     "polar-swimmer": ("ring position $u_m$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
-    "guided-division": ("equator radius $r_n$ ($R_{0}$)",),
+    "guided-division": ("neck radius $r_n$ ($R_{0}$)",),
 }
 
 
@@ -110,9 +110,8 @@ def test_arrows_are_there_and_inside_their_axes(scenario: str) -> None:
     assert shown > 20
 
 
-@pytest.mark.parametrize("scenario", MAKERS)
-def test_labels_are_readable_inside_the_page_and_apart(scenario: str) -> None:
-    figure = figure_of(scenario)
+def check_labels(figure: Figure) -> None:
+    figure.canvas.draw()
     page = Bbox.from_bounds(0, 0, figure.bbox.width, figure.bbox.height).padded(0.5)
     texts = texts_of(figure)
     boxes = [text.get_window_extent().padded(-0.5) for text in texts]
@@ -124,6 +123,11 @@ def test_labels_are_readable_inside_the_page_and_apart(scenario: str) -> None:
         assert page.containsy(box.y1), text
     for (one, box), (other, other_box) in combinations(zip(texts, boxes, strict=True), 2):
         assert not box.overlaps(other_box), f"{one.get_text()!r} over {other.get_text()!r}"
+
+
+@pytest.mark.parametrize("scenario", MAKERS)
+def test_labels_are_readable_inside_the_page_and_apart(scenario: str) -> None:
+    check_labels(figure_of(scenario))
 
 
 def test_neck_inset_only_where_there_is_a_neck() -> None:
@@ -246,11 +250,63 @@ def test_units_are_typeset(stored: str, shown: str) -> None:
     assert style.math_units(stored) == shown
 
 
+@cache
+def dying_flow() -> xr.Dataset:
+    """A protrusion nearly all of whose change is early, and whose flow dies by four decades over the frames."""
+    dataset = dataset_of("membrane-protrusion")
+    part = np.linspace(0, 1, FRAMES)
+    slow = dataset.assign_coords(time=("time", 2 * part * 10.0 ** (4 * (part - 1)), dataset["time"].attrs))
+    for name, speed in (("tangential_velocity", -1.0), ("normal_velocity", 2.0)):
+        flow = speed * 10.0 ** (-4 * part[:, None]) * np.sin(np.pi * dataset["mesh_coordinate"].values)
+        slow[name] = (("time", "point"), flow, dataset[name].attrs)
+    return slow
+
+
+def test_early_change_gets_a_logarithmic_time_axis() -> None:
+    figure = plot_run(dying_flow())
+    check_labels(figure)
+    assert figure.axes[0].get_xscale() == "symlog"
+    ticks = figure.axes[0].get_xticks()
+    assert ticks[0] == 0
+    assert len(ticks) > 3
+    assert figure_of("membrane-protrusion").axes[0].get_xscale() == "linear"
+
+
+def test_a_dying_flow_gets_an_arrow_scale_per_snapshot() -> None:
+    def keys(figure: Figure) -> int:
+        return sum(
+            text.get_color() == style.RED and text.get_text().endswith("$R_{b}/\\tau$") for text in figure.findobj(Text)
+        )
+
+    assert keys(figure_of("membrane-protrusion")) == 1
+    assert keys(plot_run(dying_flow())) > 1
+
+
+def test_movie_arrow_scale_follows_a_dying_flow() -> None:
+    with style.house_style():
+        scene = movie.Scene(dying_flow(), 12, 64)
+        scene.show(3)
+        early = scene._flow_key.get_text()
+        scene.show(11)
+        assert scene._flow_key.get_text() != early
+        assert movie.Scene(dataset_of("polar-swimmer"), 4, 64)._flow_key is None
+
+
+def test_smoothed_flow_is_nowhere_exceeded() -> None:
+    flows = np.random.default_rng(1).uniform(0.1, 1, 60)
+    smooth = movie._smoothed(flows)
+    assert smooth.shape == flows.shape
+    assert np.all(smooth >= flows)
+    np.testing.assert_array_equal(movie._smoothed(np.ones(3)), np.ones(3))
+
+
 @pytest.mark.parametrize(
     ("stored", "shown"),
     [
         ("C_phi^phi", "$C_{\\phi}^{\\phi}$"),
         ("v_u", "$v_u$"),
+        ("v0", "$v_{0}$"),
+        ("r(1/2)", "$r(1/2)$"),
         ("$r_n$", "$r_n$"),
         ("\\tilde{c}", "$\\tilde{c}$"),
         ("broken_{", "broken_{"),

@@ -14,8 +14,8 @@ def uniform_mesh(elements: int) -> Array:
 
 
 def next_size(elements: int) -> int:
-    """The next larger element count; the largest stays."""
-    return next((size for size in SIZES if size > elements), SIZES[-1])
+    """At least twice as many elements, as each size met on the way costs a compilation; the largest stays."""
+    return next((size for size in SIZES if size >= 2 * elements), SIZES[-1])
 
 
 def equidistribute(mesh: Array, density: Array, elements: int, floor: float = 0.2, smoothing: int = 2) -> Array:

@@ -13,6 +13,9 @@ Array = NDArray[np.float64]
 
 _ARRAYS = ("mesh", "nodes", "slopes", "algebraic", "scalars", "rates")
 
+# What only pictures need; everything that a resumed run starts from keeps its digits.
+_PRECISION = {"rates": np.float32}
+
 # What reading bytes that are not those of a frame may raise.
 DAMAGE = (zipfile.BadZipFile, ValueError, KeyError, EOFError, OSError, RuntimeError, struct.error, zlib.error)
 
@@ -22,7 +25,8 @@ class Frame:
     """The state after a time step. Arrays are dimensionless; times and observables are in the scenario's units.
 
     Shapes, for N elements of k Gauss points with n differential and na algebraic fields and ns scalars: mesh (N+1,),
-    nodes (N+1, n), slopes (N, k, n), algebraic (N, k, na), scalars (ns,), rates (N, k, nq) of the stored quantities.
+    nodes (N+1, n), slopes (N, k, n), algebraic (N, k, na), scalars (ns,), rates (N, k, 2): dr/dt and dz/dt at fixed u,
+    for pictures, kept in single precision.
     `step` is the step that led here (0 for the initial state), `next_step` the one to try next. An observable that does
     not apply is absent, never NaN.
     """
@@ -42,7 +46,7 @@ class Frame:
 def encode_frame(frame: Frame) -> bytes:
     """The bytes of a frame's file, a zip archive of arrays with the CRC of each."""
     buffer = io.BytesIO()
-    arrays = {name: np.asarray(getattr(frame, name), dtype=np.float64) for name in _ARRAYS}
+    arrays = {name: np.asarray(getattr(frame, name), dtype=_PRECISION.get(name, np.float64)) for name in _ARRAYS}
     np.savez(
         buffer,
         clock=np.array([frame.time, frame.step, frame.next_step], dtype=np.float64),

@@ -1,7 +1,6 @@
 """Observables of a state, by their contract names, dimensionless."""
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
 
 from shapespace.base.arrays import Array
 from shapespace.base.problem import Rate
@@ -10,6 +9,8 @@ from shapespace.study.engine import Engine
 from shapespace.variational.ledger import densities
 
 _SAMPLES_PER_ELEMENT = 4
+_ZOOMS = 5
+"""Each narrows the place of an extremum eightfold; its value then is exact to round-off."""
 
 
 def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
@@ -27,7 +28,7 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
         "max_meridional_curvature": peaks["curvature"],
         **{name: integrals[name] for name in ("area", "bending_energy", "dissipation", "energy", "external_power")},
     }
-    neck = neck_radius(state, column["r"], column["psi"])
+    neck = neck_radius(state, column["r"])
     if neck is not None:
         out["neck_radius"] = neck
     if "p" in scalars:
@@ -70,15 +71,12 @@ def _samples(state: State) -> Array:
     return np.union1d(np.append(points.ravel(), 1.0), [0.5])
 
 
-def neck_radius(state: State, r: int, psi: int) -> float | None:
-    """The smallest r at an interior local minimum of r(u), where cos(psi) rises through zero; None without one."""
+def neck_radius(state: State, r: int) -> float | None:
+    """The smallest r at an interior local minimum of r(u), r being field number `r`; None without one."""
     u = _samples(state)
-    slope = np.cos(state.values(u)[:, psi])
-    rising = np.flatnonzero((slope[:-1] < 0.0) & (slope[1:] >= 0.0))
-    radii = []
-    for i in rising:
-        at = brentq(lambda x: float(np.cos(state.values(np.array([x]))[0, psi])), u[i], u[i + 1], xtol=1e-14)
-        radii.append(float(state.values(np.array([at]))[0, r]))
+    values = state.values(u)[:, r]
+    inner = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1
+    radii = [-_largest_between(state, r, -1.0, u[i - 1], u[i + 1])[1] for i in inner]
     return min(radii) if radii else None
 
 
@@ -92,8 +90,14 @@ def largest_value(state: State, field: int) -> tuple[float, float]:
     i = int(values.argmax())
     if i in (0, len(u) - 1):
         return float(u[i]), top
-    found = minimize_scalar(
-        lambda x: -float(state.values(np.array([x]))[0, field]), bounds=(u[i - 1], u[i + 1]), method="bounded",
-        options={"xatol": 1e-10},
-    )  # fmt: skip
-    return (float(found.x), -float(found.fun)) if -found.fun >= top else (float(u[i]), top)
+    return _largest_between(state, field, 1.0, u[i - 1], u[i + 1])
+
+
+def _largest_between(state: State, field: int, sign: float, left: float, right: float) -> tuple[float, float]:
+    """Where sign * field is largest between two points with one maximum between them, and that value, by zooming in."""
+    for _ in range(_ZOOMS):
+        u = np.linspace(left, right, 17)
+        values = sign * state.values(u)[:, field]
+        i = int(values.argmax())
+        left, right = u[max(i - 1, 0)], u[min(i + 1, 16)]
+    return float(u[i]), float(values[i])

@@ -61,8 +61,7 @@ class Simulation:
 
     def _neck_event(self, moment: Moment) -> Outcome | None:
         assert isinstance(moment.problem, CollocationProblem)
-        fields = self._engine.system.fields
-        neck = neck_radius(moment.problem.unpack(moment.x), fields.index("r"), fields.index("psi"))
+        neck = neck_radius(moment.problem.unpack(moment.x), self._engine.system.fields.index("r"))
         return Outcome.NECK_CLOSED if neck is not None and neck < CLOSING_RADIUS else None
 
     def _moment(self, frame: Frame) -> Moment:
@@ -93,7 +92,7 @@ class Simulation:
             slopes=state.slopes,
             algebraic=state.algebraic,
             scalars=state.scalars,
-            rates=problem.rates(moment.x, engine.p, rate),
+            rates=problem.rates(moment.x, engine.p, rate)[..., :2],
             observables={name: value * scales.factor(name) for name, value in values.items()},
         )
 

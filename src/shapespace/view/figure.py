@@ -132,7 +132,7 @@ def common_limits(profiles: Sequence[Profile], cameras: Sequence[Camera], *, wit
     pairs = zip(profiles, cameras, strict=True)
     extents = np.array([extent(p, camera, offset_of(camera, p), with_swim=with_swim) for p, camera in pairs])
     size = cameras[0].size
-    strip = 0.42 * size
+    strip = (0.42 if _is_one(cameras) else 0.68) * size
     if with_swim and cameras[0].swim_scale > 0:  # for the numbers beyond the tips of the arrows
         extents[:, 2:] += np.array([-0.25, 0.25]) * size
     half = float(np.abs(extents[:, :2]).max())
@@ -161,7 +161,7 @@ def _draw_snapshots(
     grid = part.add_gridspec(1, columns + 1, width_ratios=[1.0] * columns + [0.07])
     row = [part.add_subplot(grid[0, k]) for k in range(columns)]
     stamps = style.time_stamps([p.time for p in profiles], style.symbol_of(time), style.units_of(time))
-    one_scale = len({camera.arrow_scale for camera in cameras}) == 1
+    one_scale = _is_one(cameras)
     for number, (axes, profile, camera, stamp) in enumerate(zip(row, profiles, cameras, stamps, strict=True), start=1):
         SnapshotArtists(axes, camera, with_swim=layout.with_swim).show(profile, offset_of(camera, profile))
         prepare_snapshot_axes(axes, limits)
@@ -169,7 +169,7 @@ def _draw_snapshots(
         if layout.with_swim:
             label_speed(axes, run, camera, profile)
         if (one_scale and number == 1) or (not one_scale and _flows(profile, camera)):
-            draw_arrow_key(axes, run, camera, limits)
+            draw_arrow_key(axes, run, camera, limits, line=0 if one_scale else 1)
     camera = cameras[0]
     draw_length_key(row[1] if one_scale else row[0], run, camera, limits)
     if columns > 2 and one_scale:
@@ -180,15 +180,20 @@ def _draw_snapshots(
         draw_colour_bar(part, part.add_subplot(grid[0, -1]), run, camera)
 
 
+def _is_one(cameras: Sequence[Camera]) -> bool:
+    """Whether all have the same scale of arrows."""
+    return len({camera.arrow_scale for camera in cameras}) == 1
+
+
 def _flows(profile: Profile, camera: Camera) -> bool:
     """Whether any arrow is long enough to be drawn."""
     return fastest_flow(profile, camera.is_open) * camera.arrow_scale >= camera.shortest_arrow
 
 
-def draw_coat_key(axes: Axes, camera: Camera, limits: Limits) -> None:
-    """What yellow means on an open membrane, in the line of the other keys."""
+def draw_coat_key(axes: Axes, camera: Camera, limits: Limits, *, on_top: bool = False) -> None:
+    """What yellow means on an open membrane, in the line of the other keys or in the upper corner."""
     size = camera.size
-    x, y = limits[1] - 0.62 * size, limits[2] + 0.09 * size
+    x, y = limits[1] - 0.62 * size, limits[3] - 0.2 * size if on_top else limits[2] + 0.09 * size
     axes.add_patch(
         Rectangle((x, y), 0.14 * size, 0.14 * size, facecolor=style.COAT, edgecolor=style.INK, linewidth=0.5)
     )
@@ -215,12 +220,12 @@ def label_speed(axes: Axes, run: Run, camera: Camera, profile: Profile) -> None:
     axes.text(x, y + 0.08 * side * camera.size, text, color=style.GREEN, va=va, ha="center")
 
 
-def draw_arrow_key(axes: Axes, run: Run, camera: Camera, limits: Limits) -> None:
-    """A reference arrow for the flow, below the first snapshot; all snapshots share its scale."""
+def draw_arrow_key(axes: Axes, run: Run, camera: Camera, limits: Limits, line: int = 0) -> None:
+    """A reference arrow for the flow, in a line of the keys counted from below."""
     if camera.arrow_scale == 0:
         return
     speed = round_down(camera.longest_arrow / camera.arrow_scale)
-    y = limits[2] + 0.16 * camera.size
+    y = limits[2] + (0.16 + 0.26 * line) * camera.size
     x = limits[0] + 0.06 * camera.size
     length = speed * camera.arrow_scale
     camera.quiver(axes, np.array([[x], [y], [length], [0.0]]), style.RED)

@@ -153,14 +153,17 @@ class Scene:
         curve = observable(dataset, layout.curve)
         positions = frame_positions(progress_measure(self._run, curve), frames)
         self._profiles = [self._run.profile(float(p)) for p in positions]
+        self._colour = panels.colour_of(layout.curve)
+        self._early = panels.early_time(self._run, curve)
         self._values = np.interp(positions, np.arange(curve.size), curve)
         self._camera = make_camera(self._run, self._profiles, arrow_width=1.6 / 72)
         self._swims = layout.with_swim and self._camera.swim_scale > 0
-        self._flows = _smoothed(arrow_flows(self._profiles, self._camera))
+        self._flows = _smoothed(arrow_flows(self._profiles, self._camera, rest=1e-3, ignored=0.3))
         cameras = [self._camera.for_flow(f) if f > 0 else self._camera for f in self._flows]
         left, right, bottom, top = common_limits(self._profiles, cameras, with_swim=self._swims)
-        room = 0.35 * self._camera.size if self._swims else 0.0  # for the labels of the ruler
-        self._limits = (left - room, right + room, bottom, top)
+        ruler = 0.45 * self._camera.size if self._swims else 0.0
+        coat_key = 0.3 * self._camera.size if self._run.is_open else 0.0
+        self._limits = (left - ruler, right + ruler, bottom, top + coat_key)
         self.figure = Figure(figsize=INCHES, dpi=dpi)
         FigureCanvasAgg(self.figure)
         self._build_moving(self._draw_still(layout, dpi))
@@ -173,14 +176,14 @@ class Scene:
         surface = still.add_axes(_SURFACE_BOX)
         prepare_snapshot_axes(surface, self._limits)
         self._flow_key = self._draw_flow_key(surface)
-        draw_length_key(surface, run, camera, self._limits, at=0.38)
+        draw_length_key(surface, run, camera, self._limits, at=0.5)
         if run.is_open:
-            draw_coat_key(surface, camera, self._limits)
+            draw_coat_key(surface, camera, self._limits, on_top=True)
         elif run.regulator:
             draw_colour_bar(still, still.add_axes((0.485, 0.16, 0.013, 0.68)), run, camera)
         curve = still.add_axes((_CLOCKS_LEFT, 0.15, 0.235 if layout.twin else 0.305, 0.54))
         panels.draw_curve(curve, run, layout.curve, layout.words, layout.twin, [])
-        self._clocks = [Clock(still, self.figure, run.dataset["time"], 0.88, 17, style.INK)]
+        self._clocks = [Clock(still, self.figure, run.dataset["time"], 0.88, 17, style.INK, self._early)]
         if self._swims:
             self._clocks.append(Clock(still, self.figure, run.dataset["velocity"], 0.79, 13, style.GREEN))
         canvas.draw()  # type: ignore[no-untyped-call]
@@ -210,7 +213,7 @@ class Scene:
         over.set_axis_off()
         points = np.stack([[p.time for p in self._profiles], self._values], -1)
         self._dots = curve.transAxes.inverted().transform(curve.transData.transform(points))
-        (self._dot,) = over.plot([], [], "o", color=style.BLUE, markersize=9, markeredgecolor="white", clip_on=False)
+        (self._dot,) = over.plot([], [], "o", color=self._colour, markersize=9, markeredgecolor="white", clip_on=False)
         over.set(xlim=(0, 1), ylim=(0, 1))
 
     def show(self, k: int) -> None:
@@ -254,11 +257,18 @@ class Clock:
     """`symbol = value units` at height `y` of the page: symbol and units stand on the still figure, digits move."""
 
     def __init__(
-        self, still: Figure, moving: Figure, variable: xr.DataArray, y: float, size: float, colour: str
+        self,
+        still: Figure,
+        moving: Figure,
+        variable: xr.DataArray,
+        y: float,
+        size: float,
+        colour: str,
+        least: float = 0.0,
     ) -> None:
         values = np.asarray(variable.values, dtype=np.float64)
-        span = float(np.abs(values).max()) or 1.0
-        self._decimals = max(0, 2 - int(np.floor(np.log10(span))))
+        span = least or 0.01 * float(np.abs(values).max()) or 1.0  # what two or more digits should show
+        self._decimals = max(0, -int(np.floor(np.log10(span))))
         shared: dict[str, Any] = {"fontsize": size, "color": colour, "va": "baseline"}
         left = still.text(_CLOCKS_LEFT, y, f"{style.symbol_of(variable)} = ", ha="left", **shared)
         widest = max((style.fixed(float(v), self._decimals) for v in (values.min(), values.max())), key=len)

@@ -5,13 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator
 
 from shapespace.view import style
 from shapespace.view.frames import Array, Profile, Run, observable, progress_measure
 
 GROWTH = "growth speed"  # not an observable: the normal velocity of the apex
-_OWN_SCALE_FACTOR = 4.0  # panels of one row get their own scales where their ranges differ by more
+_OWN_SCALE_FACTOR = {"velocity": 10.0, "curvature": 4.0}  # between the ranges of a row: more, and each has its own
 _EARLY = 0.03  # part of the run's time
 _REST = 0.01  # velocities below this part of the row's largest are rest: not magnified
 _INSET_FACTOR = 8.0  # a peak this much above its surroundings is shown enlarged
@@ -48,11 +48,23 @@ def words_of(name: str) -> str:
 
 def _scale_time(axes: Axes, run: Run, values: Array) -> None:
     """Logarithmic time, linear near 0, where most of the change takes up too small a part of a linear axis."""
+    early = early_time(run, values)
+    if early > 0:
+        axes.set_xscale("symlog", linthresh=early, linscale=0.6)
+        inches = axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
+        room = max(2, int(inches / 0.65))  # for tick labels
+        first, last = (int(np.floor(np.log10(t) + 1e-9)) for t in (early, run.time[-1]))
+        powers = range(last, first - 1, -max(1, int(np.ceil((last - first + 1) / room))))
+        axes.xaxis.set_major_locator(FixedLocator([0.0, *(10.0**p for p in powers)]))
+
+
+def early_time(run: Run, values: Array) -> float:
+    """The power of ten below the time of the first changes, if half of all change is over very early; else 0."""
     change = progress_measure(run, values, time_share=0.0)
-    early, half = (float(np.interp(part, change, run.time)) - run.time[0] for part in (0.03, 0.5))
-    if run.time[0] == 0 and half < _EARLY * run.time[-1]:
-        linear = 10.0 ** np.floor(np.log10(early))
-        axes.set_xscale("symlog", linthresh=linear, linscale=0.6)
+    first, half = (float(np.interp(part, change, run.time)) for part in (0.03, 0.5))
+    if run.time[0] != 0 or half > _EARLY * run.time[-1]:
+        return 0.0
+    return float(10.0 ** np.floor(np.log10(first)))
 
 
 def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int], colour: str) -> None:
@@ -126,7 +138,7 @@ def draw_profiles(
     common = min(low for low, _ in ranges), max(high for _, high in ranges)
     widths = np.array([high - low for low, high in ranges])
     seen = widths > rest * widths.max()
-    apart = bool(seen.any()) and widths.max() > _OWN_SCALE_FACTOR * widths[seen].min()
+    apart = bool(seen.any()) and widths.max() > _OWN_SCALE_FACTOR[words] * widths[seen].min()
     for k, (axes, (low, high)) in enumerate(zip(row, ranges, strict=True)):
         if not apart:
             low, high = common

@@ -23,7 +23,6 @@ from shapespace.view.frames import Array, Profile, Run
 _RINGS = 132  # points of the drawn meridian
 _FACETS = 72  # points of a drawn parallel
 _OWN_SCALE_FACTOR = 10.0  # between the flows of the snapshots
-_REST = 1e-3  # a flow below this part of the fastest counts as rest
 _LIGHT = np.array([-0.42, 0.62, 0.66]) / np.linalg.norm([-0.42, 0.62, 0.66])
 _SHADE = np.array([0.25, 0.32, 0.42])  # what is left of red, green and blue in full shade: bluish, as under a sky
 _GLINT = (_LIGHT + np.array([0, 0, 1])) / np.linalg.norm(_LIGHT + np.array([0, 0, 1]))
@@ -103,7 +102,7 @@ def make_camera(run: Run, profiles: Sequence[Profile], arrow_width: float = 1.15
     swim = max(abs(p.swim) for p in profiles)
     # Round-off is not a flow, and a surface that stays where it is does not swim.
     rest = 1e-9 * size / float(run.time[-1] - run.time[0])
-    swims = swim > max(rest, _REST * fastest)
+    swims = swim > max(rest, 1e-3 * fastest)
     camera = Camera(
         elevation=float(np.deg2rad(24.0 if run.is_open else 8.0)),
         colours=mappable,
@@ -117,17 +116,19 @@ def make_camera(run: Run, profiles: Sequence[Profile], arrow_width: float = 1.15
     return camera.for_flow(fastest) if fastest > rest else camera
 
 
-def arrow_flows(profiles: Sequence[Profile], camera: Camera) -> Array:
+def arrow_flows(profiles: Sequence[Profile], camera: Camera, rest: float = 0.02, ignored: float = 0.0) -> Array:
     """The flow speed that gets the longest arrow, for each of `profiles`: one for all where one scale can serve.
 
-    Where the flow dies away by orders of magnitude each state has its own, down to 1e-3 of the fastest. All 0 at rest.
+    Where the flow dies away by more than a factor of ten, in more than the part `ignored` of the states, each state has
+    its own; below the part `rest` of the fastest flow a state counts as at rest. All 0 if nothing flows.
     """
     flows = np.array([fastest_flow(p, camera.is_open) for p in profiles])
     fastest = float(flows.max())
     if camera.arrow_scale == 0:
         return np.zeros_like(flows)
-    apart = fastest > _OWN_SCALE_FACTOR * flows[flows > _REST * fastest].min()
-    return np.maximum(flows, _REST * fastest) if apart else np.full_like(flows, fastest)
+    slow = float(np.quantile(flows[flows > rest * fastest], ignored))
+    apart = fastest > _OWN_SCALE_FACTOR * slow
+    return np.maximum(flows, rest * fastest) if apart else np.full_like(flows, fastest)
 
 
 def fastest_flow(profile: Profile, is_open: bool) -> float:
@@ -145,13 +146,13 @@ def _regulator_colours(run: Run, profiles: Sequence[Profile]) -> tuple[ScalarMap
         return ScalarMappable(Normalize(min(0.0, float(peak)), max(0.0, float(peak)) or 1.0), style.coat_map()), False
     areas = np.concatenate([np.gradient(p.u) * p.radius / np.trapezoid(p.radius, p.u) for p in profiles])
     order = np.argsort(values)
-    top = float(np.interp(0.99 * len(profiles), np.cumsum(areas[order]), values[order]))
+    middle, top = np.interp([0.5 * len(profiles), 0.99 * len(profiles)], np.cumsum(areas[order]), values[order])
     exceeds = float(values.max()) > 1.25 * top
-    limits = (min(0.0, float(values.min())), top if exceeds else float(values.max()))
+    limits = (min(0.0, float(values.min())), float(top if exceeds else values.max()))
     if limits[1] <= limits[0]:
         limits = (limits[0], limits[0] + 1.0)
     # A narrow peak would leave all else pale on a linear scale.
-    norm = PowerNorm(0.5, *limits) if exceeds and limits[0] == 0 else Normalize(*limits)
+    norm = PowerNorm(0.5, *limits) if limits[0] == 0 and middle < 0.2 * limits[1] else Normalize(*limits)
     return ScalarMappable(norm, style.regulator_map()), exceeds
 
 

@@ -101,7 +101,8 @@ def _is_math(text: str) -> bool:
 def math_symbol(symbol: str) -> str:
     """A symbol as stored (`v_u`, `C_phi^phi`, TeX, or a plain word) as mathtext, or as plain text if that fails."""
     bare = symbol.strip().strip("$")
-    braced = re.sub(r"([_^])([A-Za-z0-9]{2,})", r"\1{\2}", bare)
+    indexed = re.sub(r"(?<![A-Za-z0-9_^{\\])([A-Za-z])(\d+)", r"\1_{\2}", bare)
+    braced = re.sub(r"([_^])([A-Za-z0-9]{2,})", r"\1{\2}", indexed)
     for text in (f"${_greek(braced)}$", f"${bare}$"):
         if bare and _is_math(text):
             return text

@@ -1,0 +1,7 @@
+"""`python -m shapespace`."""
+
+import sys
+
+from shapespace.cli import main
+
+sys.exit(main())
