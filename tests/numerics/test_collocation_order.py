@@ -70,7 +70,8 @@ def test_superconvergence(degree: int, where: str):
 STEP = 0.02
 RING = {"initial_ring_amplitude": 1.0, "seed_amplitude": 0.3}
 FIELDS = Engine.of(scenario("guided-division")).system.fields
-INNER = ("r", "psi", "alpha", "v", "species_flux")
+# Of r, z and h the poles' error, of order k + 1, is soon the largest part everywhere, tiny as it is (1e-11 at N = 40).
+INNER = ("psi", "alpha", "v", "species_flux")
 
 
 def sphere_with_ring(u: Array, width: float) -> Array:

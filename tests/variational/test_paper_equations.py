@@ -292,7 +292,7 @@ def test_species_balance_is_the_advective_one(states):
 
 
 def test_end_conditions(states):
-    """(Table 4) and the gauge; the rim's gamma_H = gamma_0 through P_v with S_uu = -S_phiphi."""
+    """(Table 3) and the gauge; the rim's gamma_H = gamma_0 through P_v with S_uu = -S_phiphi."""
     kind, (s, f, m, at, c), _, found = states
     n, force = at["species_flux"], at["meridional_force"]
     if kind == "closed":

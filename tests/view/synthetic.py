@@ -6,6 +6,7 @@ the normal velocity from the motion of the curve; tangential flow and regulator 
 
 import json
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -213,3 +214,23 @@ MAKERS: dict[str, Callable[..., xr.Dataset]] = {
     "polar-swimmer": polar_swimmer,
     "guided-division": guided_division,
 }
+
+FRAMES = 24  # of the shared datasets
+
+
+@cache
+def dataset_of(scenario: str) -> xr.Dataset:
+    """The made-up run of a scenario, made once."""
+    return MAKERS[scenario](frames=FRAMES)
+
+
+@cache
+def dying_flow() -> xr.Dataset:
+    """A protrusion nearly all of whose change is early, and whose flow dies by four decades over the frames."""
+    dataset = dataset_of("membrane-protrusion")
+    part = np.linspace(0, 1, FRAMES)
+    slow = dataset.assign_coords(time=("time", 2 * part * 10.0 ** (4 * (part - 1)), dataset["time"].attrs))
+    for name, speed in (("tangential_velocity", -1.0), ("normal_velocity", 2.0)):
+        flow = speed * 10.0 ** (-4 * part[:, None]) * np.sin(np.pi * dataset["mesh_coordinate"].values)
+        slow[name] = (("time", "point"), flow, dataset[name].attrs)
+    return slow

@@ -1,40 +1,31 @@
-"""Figures and movies of made-up runs: they build, say what they show, and nothing is clipped or overlaps."""
+"""Figures of made-up runs: they build, say what they show, and nothing is clipped or overlaps."""
 
 from collections.abc import Iterator
 from functools import cache
 from itertools import combinations
 from pathlib import Path
 
-import imageio_ffmpeg
 import matplotlib as mpl
 import numpy as np
 import pytest
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
-from PIL import Image
-from tests.view.synthetic import MAKERS, guided_division, membrane_protrusion
+from tests.view.synthetic import FRAMES, MAKERS, dataset_of, dying_flow, guided_division
 
-from shapespace.base.errors import InputError, StoreError
-from shapespace.view import movie, plot_run, save_movie, style
+from shapespace.base.errors import InputError
+from shapespace.view import plot_run, save_movie, style
 from shapespace.view.frames import progress_measure, read_run, snapshot_frames
 from shapespace.view.snapshot import make_camera, make_surface
 
-FRAMES = 24
 CURVES = {
     "membrane-protrusion": ("height $d$ ($R_{b}$)", "growth speed ($R_{b}/\\tau$)"),
     "ring-slipping": ("ring position $u_m$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
     "polar-swimmer": ("ring position $u_m$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
     "guided-division": ("neck radius $r_n$ ($R_{0}$)",),
 }
-
-
-@cache
-def dataset_of(scenario: str) -> xr.Dataset:
-    return MAKERS[scenario](frames=FRAMES)
 
 
 @cache
@@ -250,18 +241,6 @@ def test_units_are_typeset(stored: str, shown: str) -> None:
     assert style.math_units(stored) == shown
 
 
-@cache
-def dying_flow() -> xr.Dataset:
-    """A protrusion nearly all of whose change is early, and whose flow dies by four decades over the frames."""
-    dataset = dataset_of("membrane-protrusion")
-    part = np.linspace(0, 1, FRAMES)
-    slow = dataset.assign_coords(time=("time", 2 * part * 10.0 ** (4 * (part - 1)), dataset["time"].attrs))
-    for name, speed in (("tangential_velocity", -1.0), ("normal_velocity", 2.0)):
-        flow = speed * 10.0 ** (-4 * part[:, None]) * np.sin(np.pi * dataset["mesh_coordinate"].values)
-        slow[name] = (("time", "point"), flow, dataset[name].attrs)
-    return slow
-
-
 def test_early_change_gets_a_logarithmic_time_axis() -> None:
     figure = plot_run(dying_flow())
     check_labels(figure)
@@ -280,24 +259,6 @@ def test_a_dying_flow_gets_an_arrow_scale_per_snapshot() -> None:
 
     assert keys(figure_of("membrane-protrusion")) == 1
     assert keys(plot_run(dying_flow())) > 1
-
-
-def test_movie_arrow_scale_follows_a_dying_flow() -> None:
-    with style.house_style():
-        scene = movie.Scene(dying_flow(), 12, 64)
-        scene.show(3)
-        early = scene._flow_key.get_text()
-        scene.show(11)
-        assert scene._flow_key.get_text() != early
-        assert movie.Scene(dataset_of("polar-swimmer"), 4, 64)._flow_key is None
-
-
-def test_smoothed_flow_is_nowhere_exceeded() -> None:
-    flows = np.random.default_rng(1).uniform(0.1, 1, 60)
-    smooth = movie._smoothed(flows)
-    assert smooth.shape == flows.shape
-    assert np.all(smooth >= flows)
-    np.testing.assert_array_equal(movie._smoothed(np.ones(3)), np.ones(3))
 
 
 @pytest.mark.parametrize(
@@ -323,81 +284,3 @@ def test_regulator_colours_fall_evenly_in_lightness() -> None:
     steps = -np.diff(lightness)
     assert np.all(steps > 0)
     assert steps.max() < 2.5 * steps.mean()
-
-
-@pytest.mark.parametrize("scenario", ["membrane-protrusion", "polar-swimmer"])
-def test_movie_has_the_frames_asked_for(scenario: str, tmp_path: Path) -> None:
-    calls: list[tuple[int, int]] = []
-    path = save_movie(
-        dataset_of(scenario), tmp_path / "run.mp4", lambda done, total: calls.append((done, total)), 0.4, 15
-    )
-    assert path == tmp_path / "run.mp4"
-    assert list(tmp_path.iterdir()) == [path]
-    frames, seconds = imageio_ffmpeg.count_frames_and_secs(path)
-    assert frames == 6
-    assert seconds == pytest.approx(0.4, abs=0.05)
-    assert calls == [(k, 6) for k in range(1, 7)]
-
-
-def test_movie_becomes_a_gif_without_ffmpeg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(movie, "find_ffmpeg", lambda: None)
-    path = save_movie(dataset_of("guided-division"), str(tmp_path / "run.mp4"), seconds=0.5, fps=10)
-    assert path == tmp_path / "run.gif"
-    assert list(tmp_path.iterdir()) == [path]
-    with Image.open(path) as image:
-        assert image.n_frames == 5
-        assert image.size == (640, 360)
-
-
-def test_system_ffmpeg_comes_first_and_a_missing_one_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(movie.shutil, "which", lambda name: f"/somewhere/{name}")
-    assert movie.find_ffmpeg() == "/somewhere/ffmpeg"
-    monkeypatch.setattr(movie.shutil, "which", lambda name: None)
-    assert movie.find_ffmpeg() == imageio_ffmpeg.get_ffmpeg_exe()
-
-    def missing(name: str) -> None:
-        raise ImportError(name)
-
-    monkeypatch.setattr(movie, "import_module", missing)
-    assert movie.find_ffmpeg() is None
-
-
-def test_an_interrupted_movie_leaves_nothing_and_keeps_the_old_one(tmp_path: Path) -> None:
-    path = tmp_path / "run.mp4"
-    path.write_bytes(b"old")
-
-    def interrupt(*_: int) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        save_movie(dataset_of("guided-division"), path, interrupt, seconds=0.2)
-    assert list(tmp_path.iterdir()) == [path]
-    assert path.read_bytes() == b"old"
-
-
-def test_movie_paths_that_cannot_be_used_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    dataset = dataset_of("guided-division")
-    with pytest.raises(InputError, match=r"must end in \.mp4 or \.gif"):
-        save_movie(dataset, tmp_path / "run.avi")
-    with pytest.raises(InputError, match="at least 2 frames"):
-        save_movie(dataset, tmp_path / "run.mp4", seconds=0.0)
-    with pytest.raises(StoreError, match="not a writable directory"):
-        save_movie(dataset, tmp_path / "nowhere" / "run.mp4", seconds=0.1)
-    monkeypatch.setattr(movie, "find_ffmpeg", lambda: "/bin/false")
-    with pytest.raises(StoreError, match="cannot write") as caught:
-        save_movie(dataset, tmp_path / "run.mp4", seconds=0.1)
-    assert "\n" not in str(caught.value)
-    assert not list(tmp_path.iterdir())
-
-
-def test_movie_artists_stay_inside_the_picture() -> None:
-    with style.house_style():
-        scene = movie.Scene(membrane_protrusion(frames=8), 8, 64)
-        for k in range(8):
-            scene.show(k)
-            scene.figure.canvas.draw()
-            for axes, quiver in arrows_of(scene.figure):
-                shown = ~np.broadcast_to(quiver.Umask, quiver.U.shape)
-                tips = (quiver.XY + np.stack([quiver.U, quiver.V], -1))[shown]
-                (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
-                assert np.all((tips >= [left, bottom]) & (tips <= [right, top]))

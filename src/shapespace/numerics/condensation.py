@@ -32,44 +32,27 @@ from shapespace.numerics.elimination import (
 )
 
 
-class ChainFactors(NamedTuple):
-    """Eliminated interior nodes. lu (N-1, 2n, n), pivot (N-1, n), rows (N-1, n, 2n + n_s) over (Y_0, Y_{e+1}, s);
-
-    integral (N-1, n_i, n): multipliers of the integral rows.
-    """
-
-    lu: Array
-    pivot: IntArray
-    rows: Array
-    integral: Array
-
-
 class Factors(NamedTuple):
-    """Everything `solve` needs. local_integral (n_i, k m, N): integral rows over the stages, in pivot order."""
+    """Everything `solve` needs, as plain arrays.
+
+    plan: pivot order of the stages; local: their factors. chain_lu (N-1, 2n, n), chain_pivot (N-1, n), chain_rows
+    (N-1, n, 2n + n_s) over (Y_0, Y_{e+1}, s), chain_integral (N-1, n_i, n): multipliers of the integral rows.
+    local_integral (n_i, k m, N): integral rows over the stages, in pivot order.
+    """
 
     widths: Array
     weights: Array
-    n: int
     plan: Plan
     local: LocalFactors
-    chain: ChainFactors
+    chain_lu: Array
+    chain_pivot: IntArray
+    chain_rows: Array
+    chain_integral: Array
     local_integral: Array
     border_lu: Array
     border_pivot: IntArray
     border_scale: Array
     singular: bool
-
-
-class Update(NamedTuple):
-    """A right-hand side or a solution by parts.
-
-    Right-hand side: nodes = continuity (N, n), stages (k, m, N), border = end rows, then integral rows.
-    Solution: nodes (N + 1, n), stages (k, m, N) over (slope, algebraic), border = scalars (n_s,).
-    """
-
-    nodes: Array
-    stages: Array
-    border: Array
 
 
 @compiled
@@ -124,7 +107,7 @@ def _transfer(widths, weights, position, work, m, n, n_s):  # type: ignore[no-un
 
 
 @compiled
-def _eliminate_chain(transfer, integral, chain):  # type: ignore[no-untyped-def]
+def _eliminate_chain(transfer, integral, lu, pivot, rows, multiplier):  # type: ignore[no-untyped-def]
     """Eliminate Y_1..Y_{N-1}; returns the rows left over (Y_0, Y_N, s): n chain rows and the integral rows.
 
     The active n rows read A Y_0 + B Y_e + C s = r. Stacked with Y_{e+1} - G_e Y_e - S_e s = r_e and the integral rows they
@@ -166,16 +149,16 @@ def _eliminate_chain(transfer, integral, chain):  # type: ignore[no-untyped-def]
         for q in range(n_i):
             for c in range(n):
                 work[2 * n + q, c] += integral[e, q, c]
-        regular = lu_rectangular(work, chain.pivot[e - 1], 2 * n) and regular
+        regular = lu_rectangular(work, pivot[e - 1], 2 * n) and regular
         for i in range(2 * n + n_i):
             for c in range(n):
                 if i < 2 * n:
-                    chain.lu[e - 1, i, c] = work[i, c]
+                    lu[e - 1, i, c] = work[i, c]
                 else:
-                    chain.integral[e - 1, i - 2 * n, c] = work[i, c]
+                    multiplier[e - 1, i - 2 * n, c] = work[i, c]
         for i in range(n):
             for c in range(n, width):
-                chain.rows[e - 1, i, c - n] = work[i, c]
+                rows[e - 1, i, c - n] = work[i, c]
     active = work[n:, n:].copy()
     return active, regular
 
@@ -201,14 +184,14 @@ def factorise(
     _integral_rows(
         widths, matrix, weights, points, plan.position, local.work, local_integral, integral, integral_scalar
     )
-    chain = ChainFactors(
+    chain = (
         np.empty((n_elements - 1, 2 * n, n)),
         np.empty((n_elements - 1, n), dtype=np.int64),
         np.empty((n_elements - 1, n, 2 * n + n_s)),
         np.empty((n_elements - 1, n_i, n)),
     )
     transfer = _transfer(widths, weights, plan.position, local.work, m, n, n_s)
-    dense[: n + n_i], chain_regular = _eliminate_chain(transfer, integral, chain)
+    dense[: n + n_i], chain_regular = _eliminate_chain(transfer, integral, *chain)
     dense[n : n + n_i, 2 * n :] += integral_scalar
     dense[n + n_i :] = ends
     largest = np.abs(dense).max(axis=1)
@@ -218,85 +201,130 @@ def factorise(
     border_regular = lu_rectangular(dense, border_pivot, len(dense))
     singular = not (regular and chain_regular and border_regular and bool(np.isfinite(dense).all()))
     return Factors(
-        widths, weights, n, plan, local, chain, local_integral, dense, border_pivot, border_scale, singular
+        widths, weights, plan, local, *chain, local_integral, dense, border_pivot, border_scale, singular
     )
 
 
 @compiled
-def _solve_chain(chain, defect, integral, ends, border_lu, border_pivot, border_scale):  # type: ignore[no-untyped-def]
+def _solve_chain(lu, pivot, rows, multiplier, defect, integral, ends, border_lu, border_pivot, border_scale):  # type: ignore[no-untyped-def]
     """Node values (N + 1, n) and scalars (n_s,) from the condensed right-hand side; `integral` is overwritten."""
     n_elements, n = defect.shape
     n_i = integral.shape[0]
-    active = defect[0].copy()
     eliminated = np.empty((n_elements - 1, n))
     work = np.empty(2 * n)
+    for i in range(n):
+        work[n + i] = defect[0, i]
     for e in range(1, n_elements):
-        work[:n] = active
-        work[n:] = defect[e]
-        forward(chain.lu[e - 1], chain.pivot[e - 1], work)
-        eliminated[e - 1] = work[:n]
-        for q in range(n_i):
-            for i in range(n):
-                integral[q] -= chain.integral[e - 1, q, i] * work[i]
-        active[:] = work[n:]
+        for i in range(n):
+            work[i] = work[n + i]
+            work[n + i] = defect[e, i]
+        forward(lu[e - 1], pivot[e - 1], work)
+        for i in range(n):
+            eliminated[e - 1, i] = work[i]
+            for q in range(n_i):
+                integral[q] -= multiplier[e - 1, q, i] * work[i]
     dense = np.empty(border_lu.shape[0])
-    dense[:n] = active
-    dense[n : n + n_i] = integral
-    dense[n + n_i :] = ends
-    dense *= border_scale
+    for i in range(n):
+        dense[i] = work[n + i]
+    for i in range(n_i):
+        dense[n + i] = integral[i]
+    for i in range(ends.shape[0]):
+        dense[n + n_i + i] = ends[i]
+    for i in range(dense.shape[0]):
+        dense[i] *= border_scale[i]
     forward(border_lu, border_pivot, dense)
     backward(border_lu, dense.shape[0], dense)
     nodes = np.empty((n_elements + 1, n))
-    nodes[0], nodes[n_elements], scalars = dense[:n], dense[n : 2 * n], dense[2 * n :].copy()
-    coupled = np.empty(chain.rows.shape[2])
-    coupled[:n], coupled[2 * n :] = nodes[0], scalars
+    for i in range(n):
+        nodes[0, i] = dense[i]
+        nodes[n_elements, i] = dense[n + i]
+    scalars = dense[2 * n :]
     for e in range(n_elements - 1, 0, -1):
-        coupled[n : 2 * n] = nodes[e + 1]
         for i in range(n):
             total = eliminated[e - 1, i]
-            for c in range(coupled.shape[0]):
-                total -= chain.rows[e - 1, i, c] * coupled[c]
+            for c in range(n):
+                total -= rows[e - 1, i, c] * nodes[0, c] + rows[e - 1, i, n + c] * nodes[e + 1, c]
+            for c in range(scalars.shape[0]):
+                total -= rows[e - 1, i, 2 * n + c] * scalars[c]
             nodes[e, i] = total
-        backward(chain.lu[e - 1], n, nodes[e])
+        backward(lu[e - 1], n, nodes[e])
     return nodes, scalars
 
 
 @compiled
-def _add_coupling(local, position, x, nodes, scalars, k):  # type: ignore[no-untyped-def]
-    """Stages (k, m, N) from their particular solution x (k m, N) in pivot order, the nodes and the scalars."""
+def _add_coupling(work, pattern, x, nodes, scalars):  # type: ignore[no-untyped-def]
+    """Turn the particular stage solution x (k m, N), in pivot order, into the stages that go with nodes and scalars."""
     size, n_elements = x.shape
-    n, m = nodes.shape[1], size // k
-    left = nodes[:-1].T.copy()
+    n = nodes.shape[1]
+    left = np.empty((n, n_elements))
+    for c in range(n):
+        for e in range(n_elements):
+            left[c, e] = nodes[e, c]
     for i in range(size):
         target = x[i]
         for c in range(n):
-            if local.pattern[i, size + c]:
-                factor, source = local.work[i, size + c], left[c]
+            if pattern[i, size + c]:
+                factor, source = work[i, size + c], left[c]
                 for e in range(n_elements):
                     target[e] += factor[e] * source[e]
         for c in range(scalars.shape[0]):
-            if local.pattern[i, size + n + c]:
-                factor = local.work[i, size + n + c]
+            if pattern[i, size + n + c]:
+                factor = work[i, size + n + c]
                 for e in range(n_elements):
                     target[e] += factor[e] * scalars[c]
-    out = np.empty((k, m, n_elements))
+
+
+@compiled
+def _solve(
+    widths, weights, position, partner, work, pattern, scale, redone, dense_lu, dense_pivot, chain_lu, chain_pivot,
+    chain_rows, chain_integral, local_integral, border_lu, border_pivot, border_scale, residual,
+):  # type: ignore[no-untyped-def]  # fmt: skip
+    """The whole solve: residual (equations (N, k, m), continuity (N, n), ends, integrals), all flat, to x, flat."""
+    size, n_elements = scale.shape
+    m, n, n_i = partner.shape[0], chain_lu.shape[2], local_integral.shape[0]
+    k = size // m
+    n_stage, n_chain = n_elements * size, n_elements * n
+    x = solve_stages(work, pattern, scale, redone, dense_lu, dense_pivot, position, partner, residual[:n_stage])
+    defect = residual[n_stage : n_stage + n_chain].copy().reshape(n_elements, n)
+    for j in range(k):
+        for i in range(n):
+            source = x[position[j * m + i]]
+            for e in range(n_elements):
+                defect[e, i] += widths[e] * weights[j] * source[e]
+    border = residual[n_stage + n_chain :]
+    n_end = border.shape[0] - n_i
+    integral = border[n_end:].copy()
+    for q in range(n_i):
+        for i in range(size):
+            for e in range(n_elements):
+                integral[q] -= local_integral[q, i, e] * x[i, e]
+    nodes, scalars = _solve_chain(
+        chain_lu, chain_pivot, chain_rows, chain_integral, defect, integral, border[:n_end], border_lu, border_pivot,
+        border_scale,
+    )  # fmt: skip
+    _add_coupling(work, pattern, x, nodes, scalars)
+    out = np.empty(nodes.size + n_elements * size + scalars.shape[0])
+    out[: nodes.size] = nodes.ravel()
+    slopes, algebraic = nodes.size, nodes.size + n_elements * k * n
     for j in range(k):
         for c in range(m):
-            out[j, c] = x[position[j * m + c]]
+            source = x[position[j * m + c]]
+            for e in range(n_elements):
+                point = e * k + j
+                if c < n:
+                    out[slopes + point * n + c] = source[e]
+                else:
+                    out[algebraic + point * (m - n) + c - n] = source[e]
+    out[out.shape[0] - scalars.shape[0] :] = scalars
     return out
 
 
-def solve(factors: Factors, rhs: Update) -> Update:
-    """Solve for one right-hand side."""
-    k, m, _ = rhs.stages.shape
-    position, n = factors.plan.position, factors.n
-    x = solve_stages(factors.local, position, factors.plan.partner, rhs.stages)
-    slopes = x[position].reshape(k, m, -1)[:, :n]
-    defect = rhs.nodes + factors.widths[:, None] * np.einsum("j,jne->en", factors.weights, slopes)
-    n_i = len(factors.local_integral)
-    n_end = len(rhs.border) - n_i
-    integral = rhs.border[n_end:] - np.einsum("qie,ie->q", factors.local_integral, x)
-    nodes, scalars = _solve_chain(
-        factors.chain, defect, integral, rhs.border[:n_end], factors.border_lu, factors.border_pivot, factors.border_scale
-    )
-    return Update(nodes, _add_coupling(factors.local, position, x, nodes, scalars, k), scalars)
+def solve(factors: Factors, residual: Array) -> Array:
+    """The increment x (nodes, slopes, algebraic, scalars) for a residual (equations, continuity, ends, integrals), flat."""
+    f = factors
+    return np.asarray(
+        _solve(
+            f.widths, f.weights, *f.plan, *f.local, f.chain_lu, f.chain_pivot, f.chain_rows, f.chain_integral,
+            f.local_integral, f.border_lu, f.border_pivot, f.border_scale, np.ascontiguousarray(residual),
+        )
+    )  # fmt: skip

@@ -306,38 +306,40 @@ def eliminate_stages(
 
 
 @compiled
-def solve_stages(local, position, partner, rhs):  # type: ignore[no-untyped-def]
-    """The stage solution (k m, N) in pivot order for right-hand sides rhs (k, m, N) at fixed nodes and scalars."""
-    size, n_elements = local.scale.shape
+def solve_stages(work, pattern, scale, redone, dense_lu, dense_pivot, position, partner, rhs):  # type: ignore[no-untyped-def]
+    """The stage solution (k m, N) in pivot order for right-hand sides rhs (N k m,) at fixed nodes and scalars."""
+    size, n_elements = scale.shape
     m = partner.shape[0]
     x = np.empty((size, n_elements))
-    for j in range(rhs.shape[0]):
+    for j in range(size // m):
         for row in range(m):
             i = position[j * m + partner[row]]
             for e in range(n_elements):
-                x[i, e] = rhs[j, row, e] * local.scale[i, e]
-    start = x[:, local.redone].copy()
+                x[i, e] = rhs[e * size + j * m + row] * scale[i, e]
+    start = np.empty((redone.shape[0], size))
+    for index in range(redone.shape[0]):
+        for i in range(size):
+            start[index, i] = x[i, redone[index]]
     for i in range(size):
         target = x[i]
         for j in range(i):
-            if local.pattern[i, j]:
-                factor, source = local.work[i, j], x[j]
+            if pattern[i, j]:
+                factor, source = work[i, j], x[j]
                 for e in range(n_elements):
                     target[e] -= factor[e] * source[e]
     for i in range(size - 1, -1, -1):
         target = x[i]
         for j in range(i + 1, size):
-            if local.pattern[i, j]:
-                factor, source = local.work[i, j], x[j]
+            if pattern[i, j]:
+                factor, source = work[i, j], x[j]
                 for e in range(n_elements):
                     target[e] -= factor[e] * source[e]
-        pivot = local.work[i, i]
+        pivot = work[i, i]
         for e in range(n_elements):
             target[e] /= pivot[e]
-    for index in range(local.redone.shape[0]):
-        column = start[:, index].copy()
-        forward(local.dense_lu[index], local.dense_pivot[index], column)
-        backward(local.dense_lu[index], size, column)
+    for index in range(redone.shape[0]):
+        forward(dense_lu[index], dense_pivot[index], start[index])
+        backward(dense_lu[index], size, start[index])
         for i in range(size):
-            x[i, local.redone[index]] = column[i]
+            x[i, redone[index]] = start[index, i]
     return x

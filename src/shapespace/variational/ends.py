@@ -23,7 +23,7 @@ class Free:
 
 @dataclass(frozen=True)
 class Traction:
-    """The isotropic tension at the end equals `tension(parameters)`: the surface is drawn from a reservoir (Table 4)."""
+    """The isotropic tension at the end equals `tension(parameters)`: a reservoir feeds the surface (Table 3)."""
 
     tension: ParameterValue
 
