@@ -53,7 +53,13 @@ def main() -> None:
     p, n, rule = engine.p, problem.n, gauss_rule(problem.degree)
     residual, linear = problem.linearise(x, p, rate)
     widths = np.diff(problem.mesh)
-    arguments = (problem.system, problem._parts(problem.unpack(x)), problem._history(rate), np.float64(rate.coefficient), p)
+    arguments = (
+        problem.system,
+        problem._parts(problem.unpack(x)),
+        problem._history(rate),
+        np.float64(rate.coefficient),
+        p,
+    )
     out = [np.asarray(part) for part in collocation._linearised(*arguments)]
     points, ends, targets = out[3], out[4], out[5]
     plan = make_plan(widths, rule.matrix, points, n, problem.n_rows)

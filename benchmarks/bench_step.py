@@ -17,8 +17,8 @@ use_one_core()
 import time  # noqa: E402  (threads are set before the libraries load)
 
 import numpy as np  # noqa: E402
-
 from benchmarks.peer_solve_bvp import TUNED, USUAL, Peer, StepResult, march  # noqa: E402
+
 from shapespace.analysis.evolution import Evolution, Moment, Stepping  # noqa: E402
 from shapespace.base.arrays import Array  # noqa: E402
 from shapespace.numerics.collocation import CollocationProblem  # noqa: E402

@@ -1,10 +1,10 @@
 """Dynamics, stationary shapes and shape spaces of axisymmetric active fluid surfaces.
 
-    import shapespace as ss
+import shapespace as ss
 
-    run = ss.run(ss.scenario("guided-division"), out="results/division")
-    run.dataset["neck_radius"]
-    ss.plot(run)
+run = ss.run(ss.scenario("guided-division"), out="results/division")
+run.dataset["neck_radius"]
+ss.plot(run)
 """
 
 from importlib import import_module
@@ -40,7 +40,10 @@ _HOMES = {
     "movie": "view.show",
     "plot": "view.show",
 }
-__all__ = [*_HOMES, "__version__"]
+__all__ = [  # noqa: PLE0604  (the table above has the names)
+    *_HOMES,
+    "__version__",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -7,13 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.dense import NO_PARAMETERS, DenseProblem
+from tests.surfaces import fields_at, make_engine, march
 
 from shapespace.analysis.evolution import Evolution, Moment, Stepping
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.numerics.newton import Newton
-from tests.dense import NO_PARAMETERS, DenseProblem
-from tests.surfaces import fields_at, make_engine, march
 
 TIGHT = Newton(1e-12)
 ORDERS = (1, 2, 3)
@@ -111,10 +111,14 @@ def test_error_control_meets_its_tolerance(name: str, order: int):
         assert outcome is Outcome.REACHED_END
         errors.append(max(float(np.abs(m.x[:2] - solution(m.time)[:2]).max()) for m in moments))
         counts.append(len(moments))
-        assert errors[-1] < counts[-1] * tolerance, f"error {errors[-1]:.1e} after {counts[-1]} steps at {tolerance:.0e}"
+        assert errors[-1] < counts[-1] * tolerance, (
+            f"error {errors[-1]:.1e} after {counts[-1]} steps at {tolerance:.0e}"
+        )
     gain = np.log(errors[0] / errors[-1]) / np.log(tolerances[0] / tolerances[-1])
     expected = order / (order + 1)
-    assert abs(gain - expected) < 0.2, f"error ~ tolerance^{gain:.2f}, expected {expected:.2f}; {errors}, steps {counts}"
+    assert abs(gain - expected) < 0.2, (
+        f"error ~ tolerance^{gain:.2f}, expected {expected:.2f}; {errors}, steps {counts}"
+    )
 
 
 def test_constraint_holds_at_every_step():

@@ -14,11 +14,11 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.polynomial import chebyshev, legendre
+from tests.surfaces import State, fields_at
 
 from shapespace.base.arrays import Array
 from shapespace.numerics.state import state_from_functions
 from shapespace.study.engine import Engine
-from tests.surfaces import State, fields_at
 
 
 def active_tension(v: Mapping[str, float]) -> tuple[float, float]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import iv
+from tests.surfaces import integral, make_engine, march, resting, stage_fields, start_of
 
 from shapespace.analysis.bdf import derivative_weights
 from shapespace.analysis.evolution import Evolution, Moment, Stepping
@@ -20,7 +21,6 @@ from shapespace.study.observables import measure
 from shapespace.study.scenario import scenario
 from shapespace.variational.ends import Free, Pinned
 from shapespace.variational.surface import make_surface_system
-from tests.surfaces import integral, make_engine, march, resting, stage_fields, start_of
 
 TIGHT = Newton(1e-11)
 
@@ -80,14 +80,14 @@ def test_guided_division_stays_symmetric():
 @pytest.mark.parametrize("turnover_rate", [45.0, 0.0])
 def test_regulator_balance(turnover_rate: float):
     """The discrete d/dt of int c dA is -k int (c - c0hat) dA at every step; without turnover the total is kept."""
-    engine = make_engine(
-        "guided-division", initial_ring_amplitude=1.0, seed_amplitude=0.2, turnover_rate=turnover_rate
-    )
+    engine = make_engine("guided-division", initial_ring_amplitude=1.0, seed_amplitude=0.2, turnover_rate=turnover_rate)
     v, problem = engine.values, engine.problem
     moments, outcome = march(engine, 0.05, newton=TIGHT)
     assert outcome is Outcome.REACHED_END
     u = problem.unpack(moments[0].x).stage_points
-    preferred = v["reference_concentration"] * (1.0 + v["ring_amplitude"] * np.exp(-(((u - 0.5) / v["ring_width"]) ** 2)))
+    preferred = v["reference_concentration"] * (
+        1.0 + v["ring_amplitude"] * np.exp(-(((u - 0.5) / v["ring_width"]) ** 2))
+    )
     totals, misses = [], []
     for moment in moments[1:]:
         f = stage_fields(engine, moment.x)

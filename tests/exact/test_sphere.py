@@ -4,6 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
+from tests.exact.sphere_rates import modes, perturbed_sphere, polar_rate, pressure, rate_matrix
+from tests.surfaces import make_engine, march, resting
 
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -12,8 +14,6 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine
 from shapespace.study.run import run
 from shapespace.study.scenario import scenario
-from tests.exact.sphere_rates import modes, perturbed_sphere, polar_rate, pressure, rate_matrix
-from tests.surfaces import make_engine, march, resting
 
 DEGREES = (1, 2, 3, 4)
 AMPLITUDE = 1e-4

@@ -138,7 +138,9 @@ class InteriorLayer(AbstractSystem):
         return np.asarray(erf((u - 0.3) / (np.sqrt(2.0) * e)))
 
 
-def solve_layer(system: BoundaryLayer | InteriorLayer, mesh: Array, degree: int, e: float, tolerance: float) -> tuple[CollocationProblem, Array]:
+def solve_layer(
+    system: BoundaryLayer | InteriorLayer, mesh: Array, degree: int, e: float, tolerance: float
+) -> tuple[CollocationProblem, Array]:
     """A layer of thickness e on a mesh; the problem is linear, so that one correction from nothing solves it."""
     problem = CollocationProblem(system, mesh, degree, 0, tolerance)
     elements, p = len(mesh) - 1, np.array([e])

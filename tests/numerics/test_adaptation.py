@@ -4,6 +4,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.numerics.manufactured import (
+    BoundaryLayer,
+    InteriorLayer,
+    exact,
+    largest_error,
+    solve_everything,
+    solve_layer,
+)
 
 from shapespace.base.arrays import Array
 from shapespace.numerics.adaptation import discretisation_error
@@ -11,7 +19,6 @@ from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.mesh import SIZES, equidistribute, next_size, symmetrise, uniform_mesh
 from shapespace.numerics.state import State, state_from_functions
-from tests.numerics.manufactured import BoundaryLayer, InteriorLayer, exact, largest_error, solve_everything, solve_layer
 
 LAYERS = {"boundary": BoundaryLayer(), "interior": InteriorLayer()}
 
@@ -35,7 +42,9 @@ def test_estimate_on_a_smooth_problem(degree: int, elements: int):
     problem, root = solve_everything(uniform_mesh(elements), degree)
     state, u = problem.unpack(root.x), np.linspace(0.0, 1.0, 3001)
     truth = np.stack([exact(u)["y1"], exact(u)["y2"]], axis=1)
-    error = float((np.abs(state.values(u) - truth).max(axis=0) / np.maximum(np.abs(state.nodes).max(axis=0), 1.0)).max())
+    error = float(
+        (np.abs(state.values(u) - truth).max(axis=0) / np.maximum(np.abs(state.nodes).max(axis=0), 1.0)).max()
+    )
     ratio = discretisation_error(state) / error
     assert 0.5 < ratio < 2.0, f"estimate/error = {ratio:.2f} at error {error:.1e}"
 
@@ -60,7 +69,9 @@ def test_adapted_mesh_beats_the_uniform_one():
     problem, x, _ = adapted("boundary", 1e-2, 1e-6)
     assert problem.elements <= 40
     error = largest_error(problem, x, lambda u: BoundaryLayer.solution(u, 1e-2))
-    uniform = largest_error(*solve_layer(BoundaryLayer(), uniform_mesh(80), 4, 1e-2, 1.0), lambda u: BoundaryLayer.solution(u, 1e-2))
+    uniform = largest_error(
+        *solve_layer(BoundaryLayer(), uniform_mesh(80), 4, 1e-2, 1.0), lambda u: BoundaryLayer.solution(u, 1e-2)
+    )
     assert error < 0.1 * uniform, f"{error:.1e} with {problem.elements} elements, {uniform:.1e} with 80 equal ones"
 
 
@@ -79,7 +90,9 @@ def test_estimate_owns_up_to_a_layer_that_is_not_resolved():
 @pytest.mark.xfail(reason="320 elements are kept, 1000 times off the tolerance, where a move would gain less than 20 %")
 def test_a_layer_far_thinner_than_the_first_elements_is_resolved():
     problem, error, _ = thin_layer()
-    assert error < 2e-4, f"error {error:.1e} left on {problem.elements} elements, down to {np.diff(problem.mesh).min():.1e}"
+    assert error < 2e-4, (
+        f"error {error:.1e} left on {problem.elements} elements, down to {np.diff(problem.mesh).min():.1e}"
+    )
 
 
 def test_a_good_mesh_is_kept():
@@ -162,7 +175,11 @@ def test_polynomials_survive_a_change_of_mesh(degree: int):
         np.testing.assert_allclose(state.values(u), np.stack([u**degree, (1 - u) ** degree], 1), atol=1e-12)
         np.testing.assert_allclose(state.derivatives(u)[:, 0], degree * u ** (degree - 1), atol=1e-9)
         np.testing.assert_allclose(state.algebraic_values(u)[:, 0], u ** (degree - 1), atol=1e-9)
-        gaps = state.nodes[:-1] + np.einsum("e,l,eln->en", state.widths, state.rule.weights, state.slopes) - state.nodes[1:]
+        gaps = (
+            state.nodes[:-1]
+            + np.einsum("e,l,eln->en", state.widths, state.rule.weights, state.slopes)
+            - state.nodes[1:]
+        )
         assert np.abs(gaps).max() < 1e-14, f"elements do not meet: {np.abs(gaps).max():.1e}"
 
 

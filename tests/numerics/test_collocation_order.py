@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 import pytest
+from tests.numerics.manufactured import SCALAR, exact, solve_everything
 
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -14,7 +15,6 @@ from shapespace.numerics.newton import Newton, solve_root
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine
 from shapespace.study.scenario import scenario
-from tests.numerics.manufactured import SCALAR, exact, solve_everything
 
 DENSE = np.linspace(0.0, 1.0, 1777)
 COUNTS = {2: (10, 20, 40), 3: (8, 16, 32), 4: (6, 12, 24), 5: (4, 8, 16, 32), 6: (4, 8, 16, 32)}

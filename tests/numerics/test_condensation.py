@@ -96,9 +96,7 @@ def factors_of(system: System) -> Factors:
     """The factorisation under test."""
     rule = gauss_rule(system.size.degree)
     points = np.ascontiguousarray(system.points.transpose(2, 3, 1, 0))
-    return factorise(
-        system.widths, rule.matrix, rule.weights, points, system.ends, system.targets, system.size.n
-    )
+    return factorise(system.widths, rule.matrix, rule.weights, points, system.ends, system.targets, system.size.n)
 
 
 def structured_solution(system: System, rhs: Array) -> Array:

@@ -4,14 +4,14 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from tests.dense import NO_PARAMETERS, DenseProblem, at_rest
+from tests.surfaces import make_engine, march
 
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.numerics.newton import Newton, Root, solve_root
 from shapespace.study.engine import Engine
-from tests.dense import NO_PARAMETERS, DenseProblem, at_rest
-from tests.surfaces import make_engine, march
 
 
 def find(function: Callable[[Array], Array], *start: float, **options: float) -> Root:
@@ -46,7 +46,9 @@ def test_converges_well_within_its_tolerance(tolerance: float):
     ],
     ids=["arctan", "log", "saturating", "exp"],
 )
-def test_damping_saves_starts_from_which_full_steps_fail(function: Callable[[Array], Array], start: float, solution: float):
+def test_damping_saves_starts_from_which_full_steps_fail(
+    function: Callable[[Array], Array], start: float, solution: float
+):
     """Full Newton steps diverge from these starts, or leave the function's domain where it is NaN."""
     root = find(function, start, max_iterations=60)
     assert root.outcome is Outcome.CONVERGED, root

@@ -21,7 +21,18 @@ SETTINGS = {"elements": 20, "until": 0.03, "mesh_tolerance": 1e-4}
 def kill_after(store: Path, frames: int) -> None:
     """Start the run in a process of its own and kill it once it has stored so many frames."""
     text = [f"{key}={value}" for key, value in SETTINGS.items()]
-    command = [sys.executable, "-m", "shapespace", "run", "guided-division", "-s", *text, "--out", str(store), "--resume"]
+    command = [
+        sys.executable,
+        "-m",
+        "shapespace",
+        "run",
+        "guided-division",
+        "-s",
+        *text,
+        "--out",
+        str(store),
+        "--resume",
+    ]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=dict(os.environ))
     deadline = time.monotonic() + 240.0
     while len(list(store.glob("frames/*.npz"))) < frames and process.poll() is None:

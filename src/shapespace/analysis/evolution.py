@@ -11,7 +11,6 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
 from shapespace.numerics.newton import Newton, Root, solve_root
 
-
 ROUND_OFF_FACTOR = 1e3
 """How much a linear solve amplifies round-off, generously; matters only for steps below 1e-5."""
 
@@ -24,9 +23,10 @@ START_LIMIT = 4.0**7
 class Stepping:
     """Options of time stepping.
 
-    order: of the backward differentiation; 1 is backward Euler. fixed_step: 0 for error control at `tolerance` (local error of the stored
-    quantities per step, relative), else the step length. first_step: the first, which no estimate can control. min_step: below it the
-    run ends in step-underflow. stationary_rate: largest relative rate of change of a state that counts as stationary.
+    order: of the backward differentiation; 1 is backward Euler. fixed_step: 0 for error control at `tolerance` (local
+    error of the stored quantities per step, relative), else the step length. first_step: the first, which no estimate can
+    control. min_step: below it the run ends in step-underflow. max_growth: largest ratio of successive steps; beyond
+    1.53 order 3 is not stable. stationary_rate: largest relative rate of change of a state that counts as stationary.
     """
 
     order: int = 3

@@ -39,6 +39,8 @@ _ADVICE = {
     Outcome.DIVERGED: "Newton could not reduce the residual: start from a nearer state or take a smaller step.",
     Outcome.SINGULAR: "The linear system is singular: an unknown is left free or a condition is repeated.",
     Outcome.NOT_FINITE: "A NaN or infinity appeared: check the start and the parameters.",
-    Outcome.STEP_UNDERFLOW: "The time step fell below its minimum: raise `elements`, loosen `time_tolerance`, or check the parameters.",
+    Outcome.STEP_UNDERFLOW: (
+        "The time step fell below its minimum: raise `elements`, loosen `time_tolerance`, or check the parameters."
+    ),
     Outcome.MAX_STEPS: "The step limit was reached: raise `max_steps` or resume.",
 }

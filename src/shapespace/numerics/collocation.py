@@ -12,7 +12,6 @@ import numpy as np
 from shapespace.base.arrays import Array, Traced
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
 from shapespace.numerics import condensation
-from shapespace.numerics.adaptation import adapted_mesh
 from shapespace.numerics.elimination import compiled
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.state import State
@@ -62,7 +61,9 @@ def _split_row(system: AbstractSystem, v: Traced) -> tuple[Traced, Traced, Trace
     return v[:n], v[n : n + n_a], v[n + n_a : 2 * n + n_a], v[2 * n + n_a :]
 
 
-def _point_rows(system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, u: Traced, p: Traced) -> Traced:
+def _point_rows(
+    system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, u: Traced, p: Traced
+) -> Traced:
     """Equations and integrands at one point as a function of its row v."""
     dy, a, y, s = _split_row(system, v)
     dq = coefficient * system.stored(y, s) + history
@@ -213,9 +214,7 @@ class CollocationProblem(AbstractProblem):
 
     def pack(self, state: State) -> Array:
         """x (size,) of a state on this mesh."""
-        return np.concatenate(
-            [state.nodes.ravel(), state.slopes.ravel(), state.algebraic.ravel(), state.scalars]
-        )
+        return np.concatenate([state.nodes.ravel(), state.slopes.ravel(), state.algebraic.ravel(), state.scalars])
 
     def unpack(self, x: Array) -> State:
         """The state of x (size,)."""
@@ -242,9 +241,9 @@ class CollocationProblem(AbstractProblem):
     def linearise(self, x: Array, p: Array, rate: Rate) -> tuple[Array, CollocationLinearisation]:
         """Residual and factorised Jacobian."""
         out = _linearised(*self._place, x, rate.history, rate.coefficient, p)
-        residual, *blocks = (np.asarray(part) for part in out)
+        residual, points, ends, targets = (np.asarray(part) for part in out)
         rule = gauss_rule(self.degree)
-        factors = condensation.factorise(self._widths, rule.matrix, rule.weights, *blocks, self.n)
+        factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n)
         return residual, CollocationLinearisation(self, factors)
 
     def stored(self, x: Array, p: Array) -> Array:
@@ -288,4 +287,3 @@ class CollocationProblem(AbstractProblem):
     def on_mesh(self, mesh: Array) -> "CollocationProblem":
         """The same problem on another mesh."""
         return replace(self, mesh=mesh)
-

@@ -175,7 +175,9 @@ def factorise(
     n_i, n_s = targets.shape
     m = n_rows - n_i
     if n_columns != m + n + n_s or ends.shape != (n + n_s - n_i, 2 * n + n_s):
-        raise ValueError(f"blocks do not fit: points {points.shape}, ends {ends.shape}, targets {targets.shape}, n = {n}.")
+        raise ValueError(
+            f"blocks do not fit: points {points.shape}, ends {ends.shape}, targets {targets.shape}, n = {n}."
+        )
     plan = make_plan(widths, matrix, points, n, m)
     local, regular = eliminate_stages(widths, matrix, points, n, m, plan)
     local_integral = np.zeros((n_i, k * m, n_elements))
@@ -200,9 +202,7 @@ def factorise(
     border_pivot = np.empty(len(dense), dtype=np.int64)
     border_regular = lu_rectangular(dense, border_pivot, len(dense))
     singular = not (regular and chain_regular and border_regular and bool(np.isfinite(dense).all()))
-    return Factors(
-        widths, weights, plan, local, *chain, local_integral, dense, border_pivot, border_scale, singular
-    )
+    return Factors(widths, weights, plan, local, *chain, local_integral, dense, border_pivot, border_scale, singular)
 
 
 @compiled
@@ -275,10 +275,10 @@ def _add_coupling(work, pattern, x, nodes, scalars):  # type: ignore[no-untyped-
 
 
 @compiled
-def _solve(
+def _solve(  # type: ignore[no-untyped-def]
     widths, weights, position, partner, work, pattern, scale, redone, dense_lu, dense_pivot, chain_lu, chain_pivot,
     chain_rows, chain_integral, local_integral, border_lu, border_pivot, border_scale, residual,
-):  # type: ignore[no-untyped-def]  # fmt: skip
+):  # fmt: skip
     """The whole solve: residual (equations (N, k, m), continuity (N, n), ends, integrals), all flat, to x, flat."""
     size, n_elements = scale.shape
     m, n, n_i = partner.shape[0], chain_lu.shape[2], local_integral.shape[0]

@@ -107,7 +107,7 @@ def _plan(cost_bytes: bytes, structure_bytes: bytes, m: int, n: int, columns: in
 
 @compiled
 def _any(values):  # type: ignore[no-untyped-def]
-    for value in values:
+    for value in values:  # noqa: SIM110  (numba compiles loops, not generators)
         if value != 0.0:
             return True
     return False
@@ -207,32 +207,48 @@ def eliminate(work, pattern, growth):  # type: ignore[no-untyped-def]
 
 @compiled
 def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]
-    """LU in place of the first len(pivot) columns of a (rows, cols), pivots from the first n_pivot_rows rows."""
+    """LU in place of the first len(pivot) columns of a (rows, cols), pivots from the first n_pivot_rows rows.
+
+    Four columns at a time: one pass over the rest of a row then does four updates. False where a pivot vanishes.
+    """
     rows, cols = a.shape
-    regular = True
-    for j in range(pivot.shape[0]):
-        best, p = abs(a[j, j]), j
-        for i in range(j + 1, n_pivot_rows):
-            if abs(a[i, j]) > best:
-                best, p = abs(a[i, j]), i
-        pivot[j] = p
-        if not best > 1e-300:
-            regular = False
-            continue
-        if p != j:
-            for c in range(cols):
-                a[j, c], a[p, c] = a[p, c], a[j, c]
-        inverse = 1.0 / a[j, j]
-        source = a[j, j + 1 :]
-        for i in range(j + 1, rows):
-            factor = a[i, j]
-            if factor != 0.0:
-                factor *= inverse
+    size = pivot.shape[0]
+    for start in range(0, size, 4):
+        stop = min(start + 4, size)
+        for j in range(start, stop):
+            best, p = abs(a[j, j]), j
+            for i in range(j + 1, n_pivot_rows):
+                if abs(a[i, j]) > best:
+                    best, p = abs(a[i, j]), i
+            pivot[j] = p
+            if not best > 1e-300:
+                return False
+            if p != j:
+                for c in range(cols):
+                    a[j, c], a[p, c] = a[p, c], a[j, c]
+            inverse = 1.0 / a[j, j]
+            for i in range(j + 1, rows):
+                factor = a[i, j] * inverse
                 a[i, j] = factor
-                target = a[i, j + 1 :]
-                for c in range(source.shape[0]):
-                    target[c] -= factor * source[c]
-    return regular
+                for c in range(j + 1, stop):
+                    a[i, c] -= factor * a[j, c]
+        for i in range(start + 1, stop):
+            for j in range(start, i):
+                factor = a[i, j]
+                for c in range(stop, cols):
+                    a[i, c] -= factor * a[j, c]
+        if stop - start == 4:
+            for i in range(stop, rows):
+                f0, f1, f2, f3 = a[i, start], a[i, start + 1], a[i, start + 2], a[i, start + 3]
+                for c in range(stop, cols):
+                    a[i, c] -= f0 * a[start, c] + f1 * a[start + 1, c] + f2 * a[start + 2, c] + f3 * a[start + 3, c]
+        else:
+            for i in range(stop, rows):
+                for j in range(start, stop):
+                    factor = a[i, j]
+                    for c in range(stop, cols):
+                        a[i, c] -= factor * a[j, c]
+    return True
 
 
 @compiled

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from shapespace.base.arrays import Array
 from shapespace.numerics.gauss import GaussRule, gauss_rule
@@ -38,7 +39,7 @@ class State:
         increments = np.einsum("jl,eln->ejn", self.rule.matrix, self.slopes)
         return np.asarray(self.nodes[:-1, None] + self.widths[:, None, None] * increments)
 
-    def _locate(self, u: Array) -> tuple[Array, Array]:
+    def _locate(self, u: Array) -> tuple[NDArray[np.intp], Array]:
         element = np.clip(np.searchsorted(self.mesh, u, side="right") - 1, 0, len(self.mesh) - 2)
         return element, (u - self.mesh[element]) / self.widths[element]
 
@@ -72,7 +73,9 @@ class State:
         return State(mesh, nodes, slopes + missing[:, None], algebraic, self.scalars.copy())
 
 
-def state_from_functions(mesh: Array, degree: int, values: Array, slopes: Array, algebraic: Array, scalars: Array) -> State:
+def state_from_functions(
+    mesh: Array, degree: int, values: Array, slopes: Array, algebraic: Array, scalars: Array
+) -> State:
     """A state from nodal values (N + 1, n), slopes (N, k, n) and algebraic fields (N, k, n_a); continuity is restored."""
     rule, widths = gauss_rule(degree), np.diff(mesh)
     missing = np.diff(values, axis=0) / widths[:, None] - np.einsum("l,eln->en", rule.weights, slopes)

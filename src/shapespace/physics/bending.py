@@ -25,5 +25,3 @@ class HelfrichBending(AbstractEnergy):
     def power(self, site: Site) -> Traced:
         """d/dt (f r h) along the motion."""
         return energy_power(self, site)
-
-

@@ -9,7 +9,10 @@ from shapespace.base.arrays import Traced
 
 
 class AbstractProfile(eqx.Module):
-    """A quantity bound to matter, given as a function of cumulative area per 2 pi."""
+    """A quantity bound to matter, given as a function of cumulative area per 2 pi.
+
+    The cumulative area is a material label on an incompressible surface only, whose system must have `material_area`.
+    """
 
     @abstractmethod
     def __call__(self, area: Traced) -> Traced:

@@ -4,6 +4,7 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import xarray as xr
 
@@ -80,7 +81,7 @@ def _fields(engine: Engine, frame: Frame) -> dict[str, Array]:
     dpsi = state.derivatives(u)[:, system.fields.index("psi")]
     h = frame.scalars[0]
     # At the poles the azimuthal curvature tends to the meridional one; the first and last points are the poles or the rim.
-    at_axis = np.array([i in (0, POINTS - 1) and "p" in system.scalars or i == 0 for i in range(POINTS)])
+    at_axis = np.array([(i in (0, POINTS - 1) and "p" in system.scalars) or i == 0 for i in range(POINTS)])
     azimuthal = np.where(at_axis, dpsi / h, np.sin(y["psi"]) / np.where(at_axis, 1.0, y["r"]))
     rates = State(frame.mesh, frame.nodes, frame.slopes, frame.rates, frame.scalars).algebraic_values(u)
     v0 = frame.scalars[system.scalars.index("v0")] if "v0" in system.scalars else 0.0
@@ -105,4 +106,4 @@ def _fields(engine: Engine, frame: Frame) -> dict[str, Array]:
 
 def _coat(engine: Engine, area: Array) -> Array:
     """C0 at cumulative areas (point,)."""
-    return np.asarray(local_spontaneous_curvature(engine.system.named(engine.p), area))
+    return np.asarray(local_spontaneous_curvature(engine.system.named(jnp.asarray(engine.p)), jnp.asarray(area)))

@@ -74,9 +74,7 @@ class Engine:
         c0 = v["reference_concentration"]
         c = c0 * (v["initial_background"] + ring) * seed
         dring = -2.0 * (u - 0.5) / width**2 * ring
-        dc = c0 * (
-            dring * seed - (v["initial_background"] + ring) * v["seed_amplitude"] * np.pi * np.sin(angle)
-        )
+        dc = c0 * (dring * seed - (v["initial_background"] + ring) * v["seed_amplitude"] * np.pi * np.sin(angle))
         tension = v["tension"] + v["active_tension"] * c0**2 / (c0**2 + v["saturation_concentration"] ** 2)
         curvature = v["bending_rigidity"] * (2.0 / radius - v["spontaneous_curvature"])
         amplitudes = {"r": radius, "moment": radius * curvature, "meridional_force": radius * tension}

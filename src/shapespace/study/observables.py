@@ -57,7 +57,8 @@ def _closed(
         "pressure": scalars["p"],
         "velocity": scalars["v0"],
         "polarity": 1.0 - poles[0] / poles[1],
-        "tension_pole": v["tension"] + v["active_tension"] * c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2),
+        "tension_pole": v["tension"]
+        + v["active_tension"] * c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2),
         "max_concentration": largest,
         "ring_position": position,
         "chemical_power": integrals["chemical_power"],

@@ -22,6 +22,7 @@ def densities(
     system: SurfaceSystem, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, p: Traced
 ) -> dict[str, Traced]:
     """Densities per du of area, volume, energies and powers; `curvature` = |C_u^u| serves for its largest value."""
+    del a  # multipliers do no work
     site = system.site(dy, y, s, dq)
     g, terms = site.geometry, system.terms(system.named(p))
     element = 2.0 * jnp.pi * area_element(g)

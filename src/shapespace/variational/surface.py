@@ -197,6 +197,10 @@ def make_surface_system(
         rates.append("species")
     if material_area:
         fields.append("area")
+    if material_area and not incompressible:
+        raise ValueError(
+            "material_area needs an incompressible surface: only there is the cumulative area a material label."
+        )
     scalars = ("h", *(["p"] if fixed_volume else []), *(["v0"] if comoving else []))
     check_ends(ends, tuple(rates))
     if not incompressible and any(isinstance(end, Traction) for pair in ends.values() for end in pair):
