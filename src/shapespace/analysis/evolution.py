@@ -11,8 +11,8 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
 from shapespace.numerics.newton import Newton, Root, solve_root
 
-ROUND_OFF_FACTOR = 1e3
-"""How much a linear solve amplifies round-off, generously; matters only for steps below 1e-5."""
+ROUND_OFF_FACTOR = 1e2
+"""How much a linear solve amplifies round-off, generously; matters only for steps below 1e-6."""
 
 
 START_LIMIT = 4.0**7

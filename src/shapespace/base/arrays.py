@@ -12,7 +12,7 @@ jax.config.update("jax_enable_x64", True)
 
 def _keep_compiled_functions() -> None:
     """Keep compiled functions between processes in the user's cache folder, unless JAX was told where to or it cannot be."""
-    if jax.config.read("jax_compilation_cache_dir") is not None:
+    if getattr(jax.config, "jax_compilation_cache_dir", None) is not None:
         return
     root = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     folder = root / "shapespace" / "jax"

@@ -9,7 +9,7 @@ from shapespace.numerics.state import State
 UNBALANCED = 3.0
 """A mesh that meets the tolerance is kept until its largest element load exceeds the mean by this factor."""
 WORTHWHILE = 0.8
-"""A move at the same size must lower the largest load at least this much: every move costs an interpolation."""
+"""Moving a balanced mesh at the same size must lower the largest load at least this much: moves cost interpolations."""
 
 
 def highest_derivative(state: State) -> Array:
@@ -56,7 +56,8 @@ def adapted_mesh(state: State, tolerance: float) -> Array:
     while _largest_load(mesh, density, moved) > allowed and elements < SIZES[-1]:
         elements = next_size(elements)
         moved = equidistribute(mesh, density, elements)
-    if elements == len(mesh) - 1 and _largest_load(mesh, density, moved) > WORTHWHILE * load.max():
+    balanced = load.max() <= UNBALANCED * load.mean()
+    if elements == len(mesh) - 1 and balanced and _largest_load(mesh, density, moved) > WORTHWHILE * load.max():
         return mesh
     return symmetrise(moved) if np.allclose(moved, 1.0 - moved[::-1], atol=1e-6) else moved
 

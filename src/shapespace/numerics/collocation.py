@@ -12,6 +12,7 @@ import numpy as np
 from shapespace.base.arrays import Array, Traced
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
 from shapespace.numerics import condensation
+from shapespace.numerics.adaptation import adapted_mesh
 from shapespace.numerics.elimination import compiled
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.state import State
@@ -283,6 +284,16 @@ class CollocationProblem(AbstractProblem):
         """Largest change of any stored quantity relative to its largest value (or one)."""
         ones, _ = self._point_weights
         return float(_largest_relative(dq, q, len(q) // (self.elements * self.degree + 2), ones))
+
+    def adapted(self, x: Array) -> "CollocationProblem":
+        """On a mesh that follows x, refined to the next size where the estimated error exceeds the tolerance."""
+        mesh = adapted_mesh(self.unpack(x), self.tolerance)
+        return self if mesh is self.mesh else self.on_mesh(mesh)
+
+    def carried(self, x: Array, other: AbstractProblem) -> Array:
+        """x on the mesh of another problem with the same system."""
+        assert isinstance(other, CollocationProblem)
+        return other.pack(self.unpack(x).on_mesh(other.mesh))
 
     def on_mesh(self, mesh: Array) -> "CollocationProblem":
         """The same problem on another mesh."""

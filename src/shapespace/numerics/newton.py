@@ -98,7 +98,7 @@ def _damped_step(
         residual = problem.residual(trial, p, rate)
         if np.isfinite(residual).all():
             correction = -linearisation.solve(residual)
-            correction_size = problem.norm(correction, trial)
+            correction_size = problem.norm(correction, x)
             if correction_size <= max((1.0 - 0.25 * damping) * size, newton.tolerance):
                 return trial, residual, correction, correction_size, damping
         damping *= 0.5
