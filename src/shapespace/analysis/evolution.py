@@ -19,6 +19,10 @@ START_LIMIT = 4.0**7
 """How much longer than asked the first step may be where Newton needs it."""
 
 
+STEP_NEWTON = Newton(max_iterations=12, min_damping=1.0 / 32.0)
+"""Patience of a time step: where Newton needs more, a shorter step is cheaper."""
+
+
 @dataclass(frozen=True)
 class Stepping:
     """Options of time stepping.
@@ -74,7 +78,7 @@ class Evolution:
     p: Array
     until: float
     stepping: Stepping
-    newton: Newton = Newton()
+    newton: Newton = STEP_NEWTON
     events: Sequence[Event] = ()
     outcome: Outcome | None = None
     _times: list[float] = field(default_factory=list)
