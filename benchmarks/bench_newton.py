@@ -16,7 +16,7 @@ from scipy.linalg import solve_banded  # noqa: E402
 from shapespace.analysis.evolution import Evolution, Moment, Stepping  # noqa: E402
 from shapespace.base.arrays import Array  # noqa: E402
 from shapespace.base.problem import Rate  # noqa: E402
-from shapespace.numerics import collocation, condensation  # noqa: E402
+from shapespace.numerics import condensation  # noqa: E402
 from shapespace.numerics.collocation import CollocationProblem  # noqa: E402
 from shapespace.numerics.elimination import eliminate_stages, make_plan  # noqa: E402
 from shapespace.numerics.gauss import gauss_rule  # noqa: E402
@@ -53,22 +53,16 @@ def main() -> None:
     p, n, rule = engine.p, problem.n, gauss_rule(problem.degree)
     residual, linear = problem.linearise(x, p, rate)
     widths = np.diff(problem.mesh)
-    arguments = (
-        problem.system,
-        problem._parts(problem.unpack(x)),
-        problem._history(rate),
-        np.float64(rate.coefficient),
-        p,
-    )
-    out = [np.asarray(part) for part in collocation._linearised(*arguments)]
-    points, ends, targets = out[3], out[4], out[5]
+    arguments = (problem.mesh, x, rate.history, rate.coefficient, p)
+    out = [np.asarray(part) for part in problem.functions.linearised(*arguments)]
+    _, points, ends, targets = out
     plan = make_plan(widths, rule.matrix, points, n, problem.n_rows)
     size = (problem.elements + 1) * n
     bands = np.random.default_rng(0).normal(size=(4 * n + 1, size)) + 10.0 * (np.arange(4 * n + 1) == 2 * n)[:, None]
     borders = np.ones((size, 4))
     rows = {
         "whole iteration (linearise + solve)": lambda: problem.linearise(x, p, rate)[1].solve(residual),
-        "  residual and Jacobian (JAX)": lambda: jax.block_until_ready(collocation._linearised(*arguments)),
+        "  residual and Jacobian (JAX)": lambda: jax.block_until_ready(problem.functions.linearised(*arguments)),
         "  factorisation (numba)": lambda: condensation.factorise(
             widths, rule.matrix, rule.weights, points, ends, targets, n
         ),

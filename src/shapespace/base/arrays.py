@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 jax.config.update("jax_enable_x64", True)
+# Every result is wanted at once, so handing work to another thread only costs.
+jax.config.update("jax_cpu_enable_async_dispatch", False)
 
 
 def _keep_compiled_functions() -> None:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cache, cached_property, partial
 from typing import NamedTuple
 
 import jax
@@ -87,7 +87,6 @@ def _assemble(system: AbstractSystem, points: _Points, rows: Traced, ends: Trace
     return jnp.concatenate([rows[:, :n_rows].ravel(), points.continuity, ends, integrals])
 
 
-@partial(jax.jit, static_argnums=(0, 1))
 def _residual(
     system: AbstractSystem, k: int, mesh: Traced, x: Traced, history: Traced, coefficient: Traced, p: Traced
 ) -> Traced:
@@ -97,7 +96,6 @@ def _residual(
     return _assemble(system, points, rows, _end_rows(system, points.ends, history[-2:], coefficient, p), p)
 
 
-@partial(jax.jit, static_argnums=(0, 1))
 def _linearised(
     system: AbstractSystem, k: int, mesh: Traced, x: Traced, history: Traced, coefficient: Traced, p: Traced
 ) -> tuple[Traced, Traced, Traced, Traced]:
@@ -119,9 +117,8 @@ def _linearised(
     return flat, jacobian, jax.jacfwd(ends)(points.ends), jax.jacfwd(lambda s: system.targets(s, p))(points.scalars)
 
 
-@partial(jax.jit, static_argnums=(0, 1, 2))
 def _integrals(
-    system: AbstractSystem, density: Density, k: int, mesh: Traced, x: Traced, history: Traced, c: Traced, p: Traced
+    system: AbstractSystem, k: int, density: Density, mesh: Traced, x: Traced, history: Traced, c: Traced, p: Traced
 ) -> tuple[dict[str, Traced], dict[str, Traced]]:
     """Integrals of named densities, and their largest values among the Gauss points."""
     points = _points(system, k, mesh, x)
@@ -135,7 +132,6 @@ def _integrals(
     return {name: points.weights @ f for name, f in values.items()}, {name: f.max() for name, f in values.items()}
 
 
-@partial(jax.jit, static_argnums=(0, 1))
 def _stored(system: AbstractSystem, k: int, mesh: Traced, x: Traced) -> Traced:
     """q at the points and at both ends, flat."""
     points, n = _points(system, k, mesh, x), len(system.fields)
@@ -147,6 +143,26 @@ def _stored(system: AbstractSystem, k: int, mesh: Traced, x: Traced) -> Traced:
     ends = points.ends
     at_ends = [system.stored(ends[:n], ends[2 * n :]), system.stored(ends[n : 2 * n], ends[2 * n :])]
     return jnp.concatenate([jax.vmap(at)(points.rows), jnp.stack(at_ends)]).ravel()
+
+
+class _Functions(NamedTuple):
+    """The functions above, compiled for one system and degree; they compile again for each number of elements."""
+
+    residual: Callable[..., Traced]
+    linearised: Callable[..., tuple[Traced, ...]]
+    integrals: Callable[..., tuple[dict[str, Traced], dict[str, Traced]]]
+    stored: Callable[..., Traced]
+
+
+@cache
+def _functions(system: AbstractSystem, k: int) -> _Functions:
+    """Compiled functions of arrays only: looking up a system at each call would cost more than small evaluations."""
+    return _Functions(
+        residual=jax.jit(partial(_residual, system, k)),
+        linearised=jax.jit(partial(_linearised, system, k)),
+        integrals=jax.jit(partial(_integrals, system, k), static_argnums=0),
+        stored=jax.jit(partial(_stored, system, k)),
+    )
 
 
 @compiled
@@ -232,16 +248,21 @@ class CollocationProblem(AbstractProblem):
         return np.ones(self.elements * self.degree + 2), np.repeat(self._widths, self.degree)
 
     @cached_property
-    def _place(self) -> tuple[AbstractSystem, int, Traced]:
-        return self.system, self.degree, jnp.asarray(self.mesh)
+    def functions(self) -> _Functions:
+        """Compiled evaluations; arguments (mesh, x, history, coefficient, p)."""
+        return _functions(self.system, self.degree)
+
+    @cached_property
+    def _device_mesh(self) -> Traced:
+        return jnp.asarray(self.mesh)
 
     def residual(self, x: Array, p: Array, rate: Rate) -> Array:
         """Equations at the Gauss points, continuity, end conditions, integral conditions."""
-        return np.asarray(_residual(*self._place, x, rate.history, rate.coefficient, p))
+        return np.asarray(self.functions.residual(self._device_mesh, x, rate.history, rate.coefficient, p))
 
     def linearise(self, x: Array, p: Array, rate: Rate) -> tuple[Array, CollocationLinearisation]:
         """Residual and factorised Jacobian."""
-        out = _linearised(*self._place, x, rate.history, rate.coefficient, p)
+        out = self.functions.linearised(self._device_mesh, x, rate.history, rate.coefficient, p)
         residual, points, ends, targets = (np.asarray(part) for part in out)
         rule = gauss_rule(self.degree)
         factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n)
@@ -249,12 +270,11 @@ class CollocationProblem(AbstractProblem):
 
     def stored(self, x: Array, p: Array) -> Array:
         """q at the Gauss points and at both ends, flattened."""
-        return np.asarray(_stored(*self._place, x))
+        return np.asarray(self.functions.stored(self._device_mesh, x))
 
     def integrals(self, density: Density, x: Array, p: Array, rate: Rate) -> tuple[dict[str, float], dict[str, float]]:
         """Gauss quadrature of density(system, dy, y, a, s, dq, p) over u, by name, and the largest point values."""
-        system, degree, mesh = self._place
-        out = _integrals(system, density, degree, mesh, x, rate.history, rate.coefficient, p)
+        out = self.functions.integrals(density, self._device_mesh, x, rate.history, rate.coefficient, p)
         sums, peaks = ({name: float(value) for name, value in part.items()} for part in out)
         return sums, peaks
 

@@ -1,6 +1,7 @@
 """Damped Newton with an affine-invariant acceptance test, reusing the Jacobian while it contracts well."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,33 +53,47 @@ def solve_root(
     corrections shrink by `reuse_contraction` the Jacobian is kept. `linearisation`: factors from a nearby state to try first.
     """
     jacobians = 0
-    if linearisation is None:
-        residual, linearisation = problem.linearise(x, p, rate)
-        jacobians = 1
-    else:
-        residual = problem.residual(x, p, rate)
-    fresh = jacobians == 1
+    residual = x[:0] if linearisation is None else problem.residual(x, p, rate)
+    step, size = None, np.inf
     for iteration in range(1, newton.max_iterations + 1):
+        fresh = linearisation is None
+        if linearisation is None:
+            residual, linearisation = problem.linearise(x, p, rate)
+            jacobians += 1
         if not np.isfinite(residual).all():
             return Root(x, Outcome.NOT_FINITE, iteration, jacobians, np.inf, None)
         if linearisation.is_singular:
             return Root(x, Outcome.SINGULAR, iteration, jacobians, np.inf, None)
-        step = -linearisation.solve(residual)
-        size = problem.norm(step, x)
+        if step is None:
+            step = -linearisation.solve(residual)
+            size = problem.norm(step, x)
         trial = _damped_step(problem, linearisation, x, p, rate, step, size, newton)
-        if trial is None and fresh:
-            return Root(x, Outcome.DIVERGED, iteration, jacobians, size, None)
-        if trial is not None:
-            x, residual, correction, correction_size, damping = trial
-            if correction_size <= newton.tolerance and damping == 1.0:
-                outcome = Outcome.CONVERGED
-                return Root(x + correction, outcome, iteration, jacobians, correction_size, linearisation)
-            if correction_size <= newton.reuse_contraction * size and damping == 1.0:
-                fresh = False
-                continue
-        residual, linearisation = problem.linearise(x, p, rate)
-        jacobians, fresh = jacobians + 1, True
+        step = None
+        if trial is None:
+            if fresh:
+                return Root(x, Outcome.DIVERGED, iteration, jacobians, size, None)
+            linearisation = None
+            continue
+        contracts = trial.size <= newton.reuse_contraction * size
+        x, residual = trial.x, trial.residual
+        if trial.size <= newton.tolerance and trial.damping == 1.0:
+            return Root(x + trial.correction, Outcome.CONVERGED, iteration, jacobians, trial.size, linearisation)
+        if contracts and trial.damping == 1.0:
+            # The simplified correction is the next step with the Jacobian kept.
+            step, size = trial.correction, trial.size
+        else:
+            linearisation = None
     return Root(x, Outcome.MAX_ITERATIONS, newton.max_iterations, jacobians, size, None)
+
+
+class _Trial(NamedTuple):
+    """An accepted point: its residual, the simplified correction there, that correction's size, the damping used."""
+
+    x: Array
+    residual: Array
+    correction: Array
+    size: float
+    damping: float
 
 
 def _damped_step(
@@ -90,7 +105,7 @@ def _damped_step(
     step: Array,
     size: float,
     newton: Newton,
-) -> tuple[Array, Array, Array, float, float] | None:
+) -> _Trial | None:
     """The first point x + damping step that passes the natural monotonicity test, halving the damping; None if none does."""
     damping = 1.0
     while damping >= newton.min_damping:
@@ -100,6 +115,6 @@ def _damped_step(
             correction = -linearisation.solve(residual)
             correction_size = problem.norm(correction, x)
             if correction_size <= max((1.0 - 0.25 * damping) * size, newton.tolerance):
-                return trial, residual, correction, correction_size, damping
+                return _Trial(trial, residual, correction, correction_size, damping)
         damping *= 0.5
     return None
