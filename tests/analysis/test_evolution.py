@@ -47,6 +47,7 @@ def evolution(
     problem: DenseProblem, past: Sequence[Moment], until: float, newton: Newton = TIGHT, **stepping: float
 ) -> tuple[list[Moment], Outcome | None]:
     """Accepted moments after the past, and why they ended."""
+    assert all(moment.problem is problem for moment in past)
     options = Stepping(**{"stationary_rate": 0.0, **stepping})  # type: ignore[arg-type]
     made = Evolution(past, NO_PARAMETERS, until, options, newton)
     return list(made), made.outcome
@@ -240,7 +241,7 @@ def test_going_on_beyond_an_end_takes_the_step_up_again():
 
 @pytest.mark.parametrize("options", [{"order": 0}, {"order": 4}, {"fixed_step": -1.0}, {"tolerance": 0.0}])
 def test_options_out_of_range_are_refused(options: dict[str, float]):
-    with pytest.raises(ValueError, match="must be|and tolerance"):
+    with pytest.raises(ValueError, match=r"must be|and tolerance"):
         Stepping(**options)  # type: ignore[arg-type]
 
 

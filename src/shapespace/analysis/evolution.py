@@ -95,9 +95,8 @@ class Evolution:
         self._stored = [problem.stored(x, self.p) for x in self._states]
         step = now.next_step or self.stepping.fixed_step or self.stepping.first_step
         for _ in range(self.stepping.max_steps):
-            if now.time >= self.until * (1.0 - 1e-14):
-                self.outcome = Outcome.REACHED_END
-                return
+            if self._at_end():
+                break
             accepted = self._advance(problem, step)
             if accepted is None:
                 return
@@ -107,7 +106,10 @@ class Evolution:
             if self.outcome is not None:
                 return
             problem = self._adapt(problem)
-        self.outcome = Outcome.MAX_STEPS
+        self.outcome = Outcome.REACHED_END if self._at_end() else Outcome.MAX_STEPS
+
+    def _at_end(self) -> bool:
+        return self._times[0] >= self.until * (1.0 - 1e-14)
 
     def _advance(self, problem: AbstractProblem, step: float) -> Moment | None:
         """Try steps until one is accepted; None and an outcome where the step falls below its minimum."""

@@ -31,6 +31,8 @@ from shapespace.numerics.elimination import (
     solve_stages,
 )
 
+ROUND_OFF = 32.0 * float(np.finfo(float).eps)
+
 
 class Factors(NamedTuple):
     """Everything `solve` needs, as plain arrays.
@@ -178,6 +180,9 @@ def factorise(
         raise ValueError(
             f"blocks do not fit: points {points.shape}, ends {ends.shape}, targets {targets.shape}, n = {n}."
         )
+    finite = bool(np.isfinite(points).all() and np.isfinite(ends).all())
+    if not finite:
+        points, ends = np.nan_to_num(points, posinf=0.0, neginf=0.0), np.nan_to_num(ends, posinf=0.0, neginf=0.0)
     plan = make_plan(widths, matrix, points, n, m)
     local, regular = eliminate_stages(widths, matrix, points, n, m, plan)
     local_integral = np.zeros((n_i, k * m, n_elements))
@@ -201,7 +206,10 @@ def factorise(
     dense *= border_scale[:, None]
     border_pivot = np.empty(len(dense), dtype=np.int64)
     border_regular = lu_rectangular(dense, border_pivot, len(dense))
-    singular = not (regular and chain_regular and border_regular and bool(np.isfinite(dense).all()))
+    # Rows are scaled, so a pivot at round-off means a condition that the others imply.
+    smallest = np.abs(dense.diagonal()).min() if border_regular else 0.0
+    regular = regular and chain_regular and bool(smallest > ROUND_OFF * np.abs(dense).max())
+    singular = not (regular and finite and bool(np.isfinite(dense).all()))
     return Factors(widths, weights, plan, local, *chain, local_integral, dense, border_pivot, border_scale, singular)
 
 
