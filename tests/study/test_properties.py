@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from shapespace.base.outcome import Outcome
@@ -14,7 +14,14 @@ from shapespace.study.run import Run, run
 from shapespace.study.scenario import Scenario, scenario
 
 GAVE_UP = {Outcome.STEP_UNDERFLOW, Outcome.MAX_STEPS}
-SLOW = settings(deadline=None, derandomize=True, database=None, suppress_health_check=[HealthCheck.too_slow])
+# A failing example is reported as drawn: shrinking would run for minutes.
+SLOW = settings(
+    deadline=None,
+    derandomize=True,
+    database=None,
+    phases=(Phase.explicit, Phase.generate),
+    suppress_health_check=[HealthCheck.too_slow],
+)
 U = np.linspace(0.0, 1.0, 61)
 
 
@@ -93,7 +100,7 @@ def test_reflection(name: str, seed: float, curvature: float):
     up, down = run(case), run(case.with_overrides({"seed_amplitude": -seed}))
     assert (up.outcome, up.steps) == (down.outcome, down.steps)
     for one, other in zip(up.frames[1::8], down.frames[1::8], strict=True):
-        check_reflected(one, other, 1e-8)
+        check_reflected(one, other, 1e-9)
 
 
 CLOSED = st.fixed_dictionaries(
