@@ -19,7 +19,7 @@ class DenseLinearisation(AbstractLinearisation):
 
     @property
     def is_singular(self) -> bool:
-        return not np.isfinite(self.matrix).all() or bool(np.linalg.cond(self.matrix) > 1e15)
+        return not np.isfinite(self.matrix).all() or not np.linalg.cond(self.matrix) < 1e15
 
     def solve(self, residual: Array) -> Array:
         return np.asarray(np.linalg.solve(self.matrix, residual))

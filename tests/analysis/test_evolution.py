@@ -2,17 +2,18 @@
 
 import functools
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
-from tests.dense import NO_PARAMETERS, DenseProblem
+from tests.dense import NO_PARAMETERS, DenseLinearisation, DenseProblem
 from tests.surfaces import fields_at, make_engine, march
 
 from shapespace.analysis.evolution import Evolution, Moment, Stepping
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
+from shapespace.base.problem import AbstractLinearisation, Rate
 from shapespace.numerics.newton import Newton
 
 TIGHT = Newton(1e-12)
@@ -175,6 +176,36 @@ def test_an_undefined_state_underflows():
         moments, outcome = evolution(problem, [Moment(0.0, problem, np.zeros(1))], 1.0, **stepping)
         assert outcome is Outcome.STEP_UNDERFLOW
         assert 0.4 < moments[-1].time <= 0.5
+
+
+@dataclass(frozen=True)
+class Reluctant(DenseProblem):
+    """dx/dt = 1, whose Jacobian counts as singular for steps from x = 0 below `least`; it cannot be tried for ever."""
+
+    least: float = 0.0
+
+    def linearise(self, x: Array, p: Array, rate: Rate) -> tuple[Array, AbstractLinearisation]:
+        assert self.calls[0] < 10_000, "it tries for ever"
+        residual, linearisation = super().linearise(x, p, rate)
+        singular = DenseLinearisation(np.zeros((1, 1)))
+        too_short = rate.coefficient * self.least > 1.0 and rate.history[0] == 0.0
+        return residual, singular if too_short else linearisation
+
+
+@pytest.mark.parametrize("stepping", [{}, {"fixed_step": 0.01}, {"first_step": 0.3}])
+def test_a_start_that_no_step_leaves_underflows(stepping: dict[str, float]):
+    problem = Reluctant(lambda x, dq, p: dq - 1.0, calls=[0], least=np.inf)
+    moments, outcome = evolution(problem, [Moment(0.0, problem, np.zeros(1))], 1.0, **stepping)
+    assert (outcome, moments) == (Outcome.STEP_UNDERFLOW, [])
+
+
+@pytest.mark.parametrize("until", [1e-4, 3e-3, 1.0])
+def test_a_start_that_only_long_steps_leave(until: float):
+    """The first step may be longer than asked, but never leads beyond the end."""
+    problem = Reluctant(lambda x, dq, p: dq - 1.0, calls=[0], least=1e-3)
+    moments, outcome = evolution(problem, [Moment(0.0, problem, np.zeros(1))], until, tolerance=1e-4)
+    assert all(m.time <= until for m in moments), f"{[m.time for m in moments]} beyond {until}"
+    assert outcome is (Outcome.REACHED_END if until > 1e-3 else Outcome.STEP_UNDERFLOW)
 
 
 def test_max_steps():

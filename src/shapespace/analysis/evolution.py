@@ -158,7 +158,7 @@ class Evolution:
             if smaller.outcome is not Outcome.CONVERGED:
                 break
             larger, root, rate = 0.25 * larger, smaller, smaller_rate
-        return larger, root, rate
+        return (larger if root.outcome is Outcome.CONVERGED else step), root, rate
 
     def _within(self, step: float) -> float:
         """The step, shortened to land on `until`, or halved where it would leave a sliver before it."""
@@ -182,7 +182,7 @@ class Evolution:
         known = None
         if self._linearisation is not None and abs(self._linearisation[1] / rate.coefficient - 1.0) < 0.2:
             known = self._linearisation[0]
-        newton = self._newton(rate)
+        newton = self._newton(rate, patient=len(self._times) == 1)
         root = solve_root(problem, guess, self.p, rate, newton, known)
         if root.outcome is not Outcome.CONVERGED and points > 1:
             root = solve_root(problem, self._states[0], self.p, rate, newton)
@@ -190,10 +190,11 @@ class Evolution:
             self._linearisation = (root.linearisation, rate.coefficient)
         return root, rate
 
-    def _newton(self, rate: Rate) -> Newton:
+    def _newton(self, rate: Rate, patient: bool) -> Newton:
         """Rates are differences over the step, so velocities carry round-off of eps/step that Newton cannot go below."""
         floor = ROUND_OFF_FACTOR * np.finfo(float).eps * abs(rate.coefficient)
-        return replace(self.newton, tolerance=min(max(self.newton.tolerance, floor), 1e-3))
+        tolerance = min(max(self.newton.tolerance, floor), 1e-3)
+        return Newton(tolerance=tolerance) if patient else replace(self.newton, tolerance=tolerance)
 
     def _local_error(self, problem: AbstractProblem, step: float, order: int, stored: Array) -> float:
         """Estimated local error of the stored quantities, from the predictor through as many moments as there are."""
