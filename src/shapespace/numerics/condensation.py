@@ -31,8 +31,6 @@ from shapespace.numerics.elimination import (
     solve_stages,
 )
 
-ROUND_OFF = 32.0 * float(np.finfo(float).eps)
-
 
 class Factors(NamedTuple):
     """Everything `solve` needs, as plain arrays.
@@ -206,9 +204,7 @@ def factorise(
     dense *= border_scale[:, None]
     border_pivot = np.empty(len(dense), dtype=np.int64)
     border_regular = lu_rectangular(dense, border_pivot, len(dense))
-    # Rows are scaled, so a pivot at round-off means a condition that the others imply.
-    smallest = np.abs(dense.diagonal()).min() if border_regular else 0.0
-    regular = regular and chain_regular and bool(smallest > ROUND_OFF * np.abs(dense).max())
+    regular = regular and chain_regular and border_regular
     singular = not (regular and finite and bool(np.isfinite(dense).all()))
     return Factors(widths, weights, plan, local, *chain, local_integral, dense, border_pivot, border_scale, singular)
 
