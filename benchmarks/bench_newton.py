@@ -57,6 +57,7 @@ def main() -> None:
     out = [np.asarray(part) for part in problem.functions.linearised(*arguments)]
     _, points, ends, targets = out
     plan = make_plan(widths, rule.matrix, points, n, problem.n_rows)
+    jumps = np.zeros((problem.elements, n, len(targets[0])))
     size = (problem.elements + 1) * n
     bands = np.random.default_rng(0).normal(size=(4 * n + 1, size)) + 10.0 * (np.arange(4 * n + 1) == 2 * n)[:, None]
     borders = np.ones((size, 4))
@@ -66,7 +67,9 @@ def main() -> None:
         "  factorisation (numba)": lambda: condensation.factorise(
             widths, rule.matrix, rule.weights, points, ends, targets, n
         ),
-        "    local elimination": lambda: eliminate_stages(widths, rule.matrix, points, n, problem.n_rows, plan),
+        "    local elimination": lambda: eliminate_stages(
+            widths, rule.weights, rule.matrix, points, jumps, problem.n_rows, plan
+        ),
         "  one solve": lambda: linear.solve(residual),
         "residual alone": lambda: problem.residual(x, p, rate),
         "peer: local elimination by LAPACK": lambda: lapack_condensation(points, widths, rule.matrix, n),

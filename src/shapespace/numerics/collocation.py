@@ -13,8 +13,8 @@ from shapespace.base.arrays import Array, Traced
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
 from shapespace.numerics import condensation
 from shapespace.numerics.adaptation import adapted_mesh
-from shapespace.numerics.elimination import compiled
 from shapespace.numerics.gauss import gauss_rule
+from shapespace.numerics.small_lu import compiled
 from shapespace.numerics.state import State
 from shapespace.numerics.system import AbstractSystem
 

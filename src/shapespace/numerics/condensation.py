@@ -7,29 +7,22 @@ Unknowns: node values Y_0..Y_N (n), per element k stages of slopes (n) and algeb
     end rows:       B0 Y_0 + B1 Y_N + Bs s = e                                                              n_b rows
     integral rows:  sum_ej w_e b_j (Id_ej [slope; alg] + Iy_ej y_ej + Is_ej s) - T s = i                    n_i rows
 
-with n_b + n_i = n + n_s. Each element is condensed to Y_{e+1} = G_e Y_e + S_e s + ... (elimination.py), interior nodes
-are eliminated one after another with row pivoting across neighbouring blocks (stable for growing and decaying solutions
-alike), and a dense system in (Y_0, Y_N, s) closes the border. The loops run in numba: LAPACK's overhead on blocks this
-small costs several times the arithmetic (docs/decisions/0001-linear-algebra-in-numba.md).
+with n_b + n_i = n + n_s. Continuity rows may also contain scalars, and integral rows node values: borders of the system need
+both. Each element is condensed to a relation of its end values (elimination.py), interior nodes are eliminated one after
+another with row pivoting across neighbouring relations (stable for growing and decaying solutions alike), and a dense
+system in (Y_0, Y_N, s) closes the border. The loops run in numba: LAPACK's overhead on blocks this small costs several times
+the arithmetic (docs/decisions/0001-linear-algebra-in-numba.md).
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from shapespace.numerics.elimination import (
-    Array,
-    IntArray,
-    LocalFactors,
-    Plan,
-    backward,
-    compiled,
-    eliminate_stages,
-    forward,
-    lu_rectangular,
-    make_plan,
-    solve_stages,
-)
+from shapespace.numerics.elimination import LocalFactors, Plan, eliminate_stages, make_plan, solve_stages
+from shapespace.numerics.small_lu import Array, IntArray, backward, compiled, forward, lu_rectangular
+
+NO_PIVOT = 1e-14
+"""Pivots of the border smaller than this part of their column count as vanished."""
 
 
 class Factors(NamedTuple):
@@ -56,8 +49,10 @@ class Factors(NamedTuple):
 
 
 @compiled
-def _integral_rows(widths, matrix, weights, points, position, work, local, nodes, scalars):  # type: ignore[no-untyped-def]
-    """Integral rows over nodes (N, n_i, n) and scalars (n_i, n_s) after condensation; `local` over the stages."""
+def _integral_rows(  # type: ignore[no-untyped-def]
+    widths, matrix, weights, points, position, work, pivoted, right, local, nodes, scalars
+):
+    """Add integral rows over nodes (N + 1, n_i, n) and scalars (n_i, n_s) after condensation; `local` over the stages."""
     n_i, size, n_elements = local.shape
     n, n_s, k = nodes.shape[2], scalars.shape[1], points.shape[2]
     m = size // k
@@ -82,39 +77,21 @@ def _integral_rows(widths, matrix, weights, points, position, work, local, nodes
             for c in range(n_s):
                 for e in range(n_elements):
                     scalars[q, c] += local[q, i, e] * work[i, size + n + c, e]
+            for index in range(pivoted.shape[0]):
+                e = pivoted[index]
+                for c in range(n):
+                    nodes[e + 1, q, c] += local[q, i, e] * right[index, i, c]
 
 
 @compiled
-def _transfer(widths, weights, position, work, m, n, n_s):  # type: ignore[no-untyped-def]
-    """[G_e | S_e] (N, n, n + n_s) of Y_{e+1} = G_e Y_e + S_e s."""
-    size, _, n_elements = work.shape
-    columns = n + n_s
-    total = np.zeros((n, columns, n_elements))
-    for i in range(n):
-        for j in range(size // m):
-            row = position[j * m + i]
-            for c in range(columns):
-                target, source = total[i, c], work[row, size + c]
-                for e in range(n_elements):
-                    target[e] += weights[j] * source[e]
-    out = np.empty((n_elements, n, columns))
-    for e in range(n_elements):
-        for i in range(n):
-            for c in range(columns):
-                out[e, i, c] = widths[e] * total[i, c, e]
-            out[e, i, i] += 1.0
-    return out
-
-
-@compiled
-def _eliminate_chain(transfer, integral, lu, pivot, rows, multiplier):  # type: ignore[no-untyped-def]
+def _eliminate_chain(relations, integral, lu, pivot, rows, multiplier):  # type: ignore[no-untyped-def]
     """Eliminate Y_1..Y_{N-1}; returns the rows left over (Y_0, Y_N, s): n chain rows and the integral rows.
 
-    The active n rows read A Y_0 + B Y_e + C s = r. Stacked with Y_{e+1} - G_e Y_e - S_e s = r_e and the integral rows they
+    The active n rows read A Y_0 + B Y_e + C s = r. Stacked with the relation of (Y_e, Y_{e+1}, s) and the integral rows they
     lose Y_e by LU with pivots from the 2n chain rows. Columns of the work array: Y_e | Y_0 | Y_{e+1} | s.
     """
-    n_elements, n, columns = transfer.shape
-    n_s = columns - n
+    n_elements, n, columns = relations.shape
+    n_s = columns - 2 * n
     n_i = integral.shape[1]
     width = 3 * n + n_s
     regular = True
@@ -122,13 +99,14 @@ def _eliminate_chain(transfer, integral, lu, pivot, rows, multiplier):  # type: 
     # The first element's rows stand where the rows left over from a step would: Y_0 in the second, Y_1 in the third block.
     for i in range(n):
         for c in range(n):
-            work[n + i, n + c] = -transfer[0, i, c]
-        work[n + i, 2 * n + i] = 1.0
+            work[n + i, n + c] = relations[0, i, c]
+            work[n + i, 2 * n + c] = relations[0, i, n + c]
         for c in range(n_s):
-            work[n + i, 3 * n + c] = -transfer[0, i, n + c]
+            work[n + i, 3 * n + c] = relations[0, i, 2 * n + c]
     for q in range(n_i):
         for c in range(n):
             work[2 * n + q, n + c] = integral[0, q, c]
+            work[2 * n + q, 2 * n + c] = integral[1, q, c]
     for e in range(1, n_elements):
         for i in range(n + n_i):
             row = i if i < n else i + n
@@ -140,15 +118,14 @@ def _eliminate_chain(transfer, integral, lu, pivot, rows, multiplier):  # type: 
                 work[row, c] = work[n + i, c]
         for i in range(n):
             for c in range(n):
-                work[n + i, c] = -transfer[e, i, c]
+                work[n + i, c] = relations[e, i, c]
                 work[n + i, n + c] = 0.0
-                work[n + i, 2 * n + c] = 0.0
-            work[n + i, 2 * n + i] = 1.0
+                work[n + i, 2 * n + c] = relations[e, i, n + c]
             for c in range(n_s):
-                work[n + i, 3 * n + c] = -transfer[e, i, n + c]
+                work[n + i, 3 * n + c] = relations[e, i, 2 * n + c]
         for q in range(n_i):
             for c in range(n):
-                work[2 * n + q, c] += integral[e, q, c]
+                work[2 * n + q, 2 * n + c] += integral[e + 1, q, c]
         regular = lu_rectangular(work, pivot[e - 1], 2 * n) and regular
         for i in range(2 * n + n_i):
             for c in range(n):
@@ -164,12 +141,21 @@ def _eliminate_chain(transfer, integral, lu, pivot, rows, multiplier):  # type: 
 
 
 def factorise(
-    widths: Array, matrix: Array, weights: Array, points: Array, ends: Array, targets: Array, n: int
+    widths: Array,
+    matrix: Array,
+    weights: Array,
+    points: Array,
+    ends: Array,
+    targets: Array,
+    n: int,
+    jumps: Array | None = None,
+    nodes: Array | None = None,
 ) -> Factors:
-    """Factorise the bordered collocation system; `singular` is set where a pivot vanished or is not finite.
+    """Factorise the bordered collocation system; `singular` is set where no unique solution exists to working accuracy.
 
     points (m + n_i, m + n + n_s, k, N): rows equations then integrands, columns (slope, algebraic), field, scalar.
     ends (n_b, 2n + n_s): columns Y_0, Y_N, scalar. targets (n_i, n_s): d(target)/ds of the integral conditions.
+    jumps (N, n, n_s): scalars in the continuity rows; nodes (N + 1, n_i, n): node values in the integral rows.
     """
     n_rows, n_columns, k, n_elements = points.shape
     n_i, n_s = targets.shape
@@ -181,32 +167,52 @@ def factorise(
     finite = bool(np.isfinite(points).all() and np.isfinite(ends).all())
     if not finite:
         points, ends = np.nan_to_num(points, posinf=0.0, neginf=0.0), np.nan_to_num(ends, posinf=0.0, neginf=0.0)
+    jumps = np.zeros((n_elements, n, n_s)) if jumps is None else jumps
+    integral = np.zeros((n_elements + 1, n_i, n)) if nodes is None else nodes.copy()
     plan = make_plan(widths, matrix, points, n, m)
-    local, regular = eliminate_stages(widths, matrix, points, n, m, plan)
-    local_integral = np.zeros((n_i, k * m, n_elements))
-    integral, dense = np.zeros((n_elements, n_i, n)), np.zeros((2 * n + n_s, 2 * n + n_s))
-    integral_scalar = -targets
+    local, relations, regular = eliminate_stages(widths, weights, matrix, points, jumps, m, plan)
+    local_integral, integral_scalar = np.zeros((n_i, k * m, n_elements)), -targets
     _integral_rows(
-        widths, matrix, weights, points, plan.position, local.work, local_integral, integral, integral_scalar
-    )
+        widths, matrix, weights, points, plan.position, local.work, local.pivoted, local.right, local_integral, integral,
+        integral_scalar,
+    )  # fmt: skip
     chain = (
         np.empty((n_elements - 1, 2 * n, n)),
         np.empty((n_elements - 1, n), dtype=np.int64),
         np.empty((n_elements - 1, n, 2 * n + n_s)),
         np.empty((n_elements - 1, n_i, n)),
     )
-    transfer = _transfer(widths, weights, plan.position, local.work, m, n, n_s)
-    dense[: n + n_i], chain_regular = _eliminate_chain(transfer, integral, *chain)
+    dense = np.zeros((2 * n + n_s, 2 * n + n_s))
+    dense[: n + n_i], chain_regular = _eliminate_chain(relations, integral, *chain)
     dense[n : n + n_i, 2 * n :] += integral_scalar
     dense[n + n_i :] = ends
     largest = np.abs(dense).max(axis=1)
     border_scale = 1.0 / np.where(largest > 0.0, largest, 1.0)
     dense *= border_scale[:, None]
+    columns = np.abs(dense).max(axis=0)
     border_pivot = np.empty(len(dense), dtype=np.int64)
     border_regular = lu_rectangular(dense, border_pivot, len(dense))
-    regular = regular and chain_regular and border_regular
-    singular = not (regular and finite and bool(np.isfinite(dense).all()))
+    pivots = np.abs(np.diagonal(dense))
+    distinct = border_regular and bool((pivots > NO_PIVOT * columns).all())
+    singular = not (regular and chain_regular and distinct and finite)
     return Factors(widths, weights, plan, local, *chain, local_integral, dense, border_pivot, border_scale, singular)
+
+
+def determinant_sign(factors: Factors) -> float:
+    """Sign of the determinant of the whole matrix, up to a factor that depends on N, k and the numbers of rows only."""
+    f, k = factors, factors.local.work.shape[0] // len(factors.plan.partner)
+    size, elements = f.local.work.shape[0], f.local.work.shape[2]
+    alone = np.setdiff1d(np.arange(elements), f.local.pivoted)
+    signs = [
+        np.sign(np.diagonal(f.local.work[:, :size])[alone]),
+        np.sign(np.diagonal(f.local.lu[:, :size], axis1=1, axis2=2)),
+        np.sign(np.diagonal(f.chain_lu, axis1=1, axis2=2)),
+        np.sign(np.diagonal(f.border_lu)),
+    ]
+    exchanges = [f.local.exchanges, f.chain_pivot, f.border_pivot]
+    odd = sum(int((e != np.arange(e.shape[-1])).sum()) for e in exchanges)
+    matching = np.linalg.det(np.eye(len(f.plan.partner))[f.plan.partner]) ** (k * elements)
+    return float(np.prod([part.prod() for part in signs]) * (-1.0) ** odd * np.round(matching))
 
 
 @compiled
@@ -256,7 +262,7 @@ def _solve_chain(lu, pivot, rows, multiplier, defect, integral, ends, border_lu,
 
 
 @compiled
-def _add_coupling(work, pattern, x, nodes, scalars):  # type: ignore[no-untyped-def]
+def _add_coupling(work, pattern, pivoted, right, x, nodes, scalars):  # type: ignore[no-untyped-def]
     """Turn the particular stage solution x (k m, N), in pivot order, into the stages that go with nodes and scalars."""
     size, n_elements = x.shape
     n = nodes.shape[1]
@@ -276,25 +282,26 @@ def _add_coupling(work, pattern, x, nodes, scalars):  # type: ignore[no-untyped-
                 factor = work[i, size + n + c]
                 for e in range(n_elements):
                     target[e] += factor[e] * scalars[c]
+        for index in range(pivoted.shape[0]):
+            e = pivoted[index]
+            for c in range(n):
+                target[e] += right[index, i, c] * nodes[e + 1, c]
 
 
 @compiled
 def _solve(  # type: ignore[no-untyped-def]
-    widths, weights, position, partner, work, pattern, scale, redone, dense_lu, dense_pivot, chain_lu, chain_pivot,
-    chain_rows, chain_integral, local_integral, border_lu, border_pivot, border_scale, residual,
+    widths, weights, position, partner, work, pattern, scale, pivoted, pivoted_lu, exchanges, right, relation_scale,
+    chain_lu, chain_pivot, chain_rows, chain_integral, local_integral, border_lu, border_pivot, border_scale, residual,
 ):  # fmt: skip
     """The whole solve: residual (equations (N, k, m), continuity (N, n), ends, integrals), all flat, to x, flat."""
     size, n_elements = scale.shape
     m, n, n_i = partner.shape[0], chain_lu.shape[2], local_integral.shape[0]
     k = size // m
     n_stage, n_chain = n_elements * size, n_elements * n
-    x = solve_stages(work, pattern, scale, redone, dense_lu, dense_pivot, position, partner, residual[:n_stage])
-    defect = residual[n_stage : n_stage + n_chain].copy().reshape(n_elements, n)
-    for j in range(k):
-        for i in range(n):
-            source = x[position[j * m + i]]
-            for e in range(n_elements):
-                defect[e, i] += widths[e] * weights[j] * source[e]
+    x, defect = solve_stages(
+        work, pattern, scale, pivoted, pivoted_lu, exchanges, right, relation_scale, position, partner, widths, weights,
+        residual[:n_stage], residual[n_stage : n_stage + n_chain],
+    )  # fmt: skip
     border = residual[n_stage + n_chain :]
     n_end = border.shape[0] - n_i
     integral = border[n_end:].copy()
@@ -306,7 +313,7 @@ def _solve(  # type: ignore[no-untyped-def]
         chain_lu, chain_pivot, chain_rows, chain_integral, defect, integral, border[:n_end], border_lu, border_pivot,
         border_scale,
     )  # fmt: skip
-    _add_coupling(work, pattern, x, nodes, scalars)
+    _add_coupling(work, pattern, pivoted, right, x, nodes, scalars)
     out = np.empty(nodes.size + n_elements * size + scalars.shape[0])
     out[: nodes.size] = nodes.ravel()
     slopes, algebraic = nodes.size, nodes.size + n_elements * k * n

@@ -2,27 +2,24 @@
 
 All elements share one pattern of non-zeros, so rows are matched to unknowns and pivots ordered once per pattern (weighted
 matching, then Markowitz' rule), and each scalar operation of the elimination becomes a vector operation over elements.
-Pivots chosen in advance can be poor on single elements; where multipliers grow beyond GROWTH_LIMIT the element is
-eliminated again on its own with partial pivoting.
+What is left of an element is a relation of its end values and the scalars, n rows over (Y_e, Y_{e+1}, s).
+
+Pivots from the stage equations alone assume that Y_e determines the stages. Beside a pole it does not: collocation follows
+solutions like r, r^2, ... exactly, and they start from zero on the axis. The first and the last element, and those whose
+multipliers exceed GROWTH_LIMIT, are therefore eliminated each on its own, with pivots from its continuity rows as well, so that
+Y_e and Y_{e+1} determine the stages together. The border of a flat disc then has a condition number of 1e2 instead of 1e16.
 """
 
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-Array = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+from shapespace.numerics.small_lu import Array, BoolArray, IntArray, backward, compiled, forward, lu_rectangular
 
-# Contraction to fused multiply-adds and reassociated sums are allowed, but NaN and infinity keep their meaning.
-compiled = njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
-
-GROWTH_LIMIT = 1e7
-"""Multipliers this large cost about seven digits; elements beyond it are redone with partial pivoting."""
+GROWTH_LIMIT = 1e4
+"""Multipliers this large would cost about four digits."""
 
 
 class Plan(NamedTuple):
@@ -35,16 +32,19 @@ class Plan(NamedTuple):
 class LocalFactors(NamedTuple):
     """Eliminated stages. work (k m, k m + n + n_s, N): upper triangle and multipliers, then d(stage)/d(Y_e, s).
 
-    pattern (k m, k m + n + n_s): non-zeros; scale (k m, N): row scaling; redone (M,): elements eliminated with pivoting,
-    their LU (M, k m, k m) and row exchanges (M, k m).
+    pattern (k m, k m + n + n_s): non-zeros; scale (k m, N): row scaling. pivoted (M,): elements eliminated with their
+    continuity rows, whose LU is lu (M, k m + n, k m) with row exchanges (M, k m); right (M, k m, n): d(stage)/dY_{e+1};
+    relation_scale (M, n): scaling of the rows left over.
     """
 
     work: Array
     pattern: BoolArray
     scale: Array
-    redone: IntArray
-    dense_lu: Array
-    dense_pivot: IntArray
+    pivoted: IntArray
+    lu: Array
+    exchanges: IntArray
+    right: Array
+    relation_scale: Array
 
 
 def make_plan(widths: Array, matrix: Array, points: Array, n: int, n_equations: int) -> Plan:
@@ -206,136 +206,137 @@ def eliminate(work, pattern, growth):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]
-    """LU in place of the first len(pivot) columns of a (rows, cols), pivots from the first n_pivot_rows rows.
+def _relations(widths, weights, position, work, jumps, m):  # type: ignore[no-untyped-def]
+    """[-G_e | I | J_e - S_e] (N, n, 2n + n_s) of Y_{e+1} - G_e Y_e + (J_e - S_e) s = ..., J_e the jumps."""
+    size, _, n_elements = work.shape
+    n, n_s = jumps.shape[1:]
+    total = np.zeros((n, n + n_s, n_elements))
+    for i in range(n):
+        for j in range(size // m):
+            row = position[j * m + i]
+            for c in range(n + n_s):
+                target, source = total[i, c], work[row, size + c]
+                for e in range(n_elements):
+                    target[e] -= weights[j] * source[e]
+    out = np.zeros((n_elements, n, 2 * n + n_s))
+    for e in range(n_elements):
+        for i in range(n):
+            for c in range(n):
+                out[e, i, c] = widths[e] * total[i, c, e]
+            out[e, i, i] -= 1.0
+            out[e, i, n + i] = 1.0
+            for c in range(n_s):
+                out[e, i, 2 * n + c] = widths[e] * total[i, n + c, e] + jumps[e, i, c]
+    return out
 
-    Four columns at a time: one pass over the rest of a row then does four updates. False where a pivot vanishes.
+
+@compiled
+def _eliminate_pivoted(widths, weights, position, filled, jumps, m, work, pivoted, lu, exchanges, right, relations, scale):  # type: ignore[no-untyped-def]  # fmt: skip
+    """Eliminate single elements with pivots from stage and continuity rows; filled (k m, columns, M): stage equations.
+
+    Writes their relations, and d(stage)/d(Y_e, s) over that of `work`; False where one of them is singular.
     """
-    rows, cols = a.shape
-    size = pivot.shape[0]
-    for start in range(0, size, 4):
-        stop = min(start + 4, size)
-        for j in range(start, stop):
-            best, p = abs(a[j, j]), j
-            for i in range(j + 1, n_pivot_rows):
-                if abs(a[i, j]) > best:
-                    best, p = abs(a[i, j]), i
-            pivot[j] = p
-            if not best > 1e-300:
-                return False
-            if p != j:
-                for c in range(cols):
-                    a[j, c], a[p, c] = a[p, c], a[j, c]
-            inverse = 1.0 / a[j, j]
-            for i in range(j + 1, rows):
-                factor = a[i, j] * inverse
-                a[i, j] = factor
-                for c in range(j + 1, stop):
-                    a[i, c] -= factor * a[j, c]
-        for i in range(start + 1, stop):
-            for j in range(start, i):
-                factor = a[i, j]
-                for c in range(stop, cols):
-                    a[i, c] -= factor * a[j, c]
-        if stop - start == 4:
-            for i in range(stop, rows):
-                f0, f1, f2, f3 = a[i, start], a[i, start + 1], a[i, start + 2], a[i, start + 3]
-                for c in range(stop, cols):
-                    a[i, c] -= f0 * a[start, c] + f1 * a[start + 1, c] + f2 * a[start + 2, c] + f3 * a[start + 3, c]
-        else:
-            for i in range(stop, rows):
-                for j in range(start, stop):
-                    factor = a[i, j]
-                    for c in range(stop, cols):
-                        a[i, c] -= factor * a[j, c]
-    return True
-
-
-@compiled
-def forward(lu, pivot, x):  # type: ignore[no-untyped-def]
-    """Apply the row exchanges, then the inverse unit lower trapezoid of a (rows, columns) LU, to one column in place."""
-    for j in range(pivot.shape[0]):
-        p = pivot[j]
-        if p != j:
-            x[j], x[p] = x[p], x[j]
-    columns = pivot.shape[0]
-    for i in range(1, lu.shape[0]):
-        row = lu[i]
-        total = 0.0
-        for j in range(min(i, columns)):
-            total += row[j] * x[j]
-        x[i] -= total
-
-
-@compiled
-def backward(lu, size, x):  # type: ignore[no-untyped-def]
-    """Solve U x = b in place for the leading upper triangle of order `size`."""
-    for i in range(size - 1, -1, -1):
-        row = lu[i]
-        total = 0.0
-        for j in range(i + 1, size):
-            total += row[j] * x[j]
-        x[i] = (x[i] - total) / row[i]
-
-
-@compiled
-def redo(work, filled, redone, dense_lu, dense_pivot):  # type: ignore[no-untyped-def]
-    """Eliminate single elements with partial pivoting; filled (size, columns, M) holds their equations as filled in."""
-    size, columns, _ = work.shape
+    n, n_s = jumps.shape[1:]
+    size = filled.shape[0]
     regular = True
-    for index in range(redone.shape[0]):
-        e = redone[index]
-        lu = filled[:, :size, index].copy()
-        regular = lu_rectangular(lu, dense_pivot[index], size) and regular
-        dense_lu[index] = lu
-        if regular:
-            for c in range(size, columns):
-                column = filled[:, c, index].copy()
-                forward(lu, dense_pivot[index], column)
-                backward(lu, size, column)
-                for i in range(size):
-                    work[i, c, e] = column[i]
+    for index in range(pivoted.shape[0]):
+        e = pivoted[index]
+        a = np.zeros((size + n, size + 2 * n + n_s))
+        a[:size, :size] = filled[:, :size, index]
+        a[:size, size : size + n] = -filled[:, size : size + n, index]
+        a[:size, size + 2 * n :] = -filled[:, size + n :, index]
+        for i in range(n):
+            for j in range(size // m):
+                a[size + i, position[j * m + i]] = -widths[e] * weights[j]
+            a[size + i, size + i] = -1.0
+            a[size + i, size + n + i] = 1.0
+            a[size + i, size + 2 * n :] = jumps[e, i]
+        if not lu_rectangular(a, exchanges[index], size + n):
+            regular = False
+            continue
+        lu[index] = a[:, :size]
+        for i in range(n):
+            largest = np.abs(a[size + i, size:]).max()
+            scale[index, i] = 1.0 / largest if largest > 0.0 else 1.0
+            relations[e, i] = scale[index, i] * a[size + i, size:]
+        for i in range(size - 1, -1, -1):
+            row, inverse = a[i], 1.0 / a[i, i]
+            for j in range(i + 1, size):
+                factor, below = row[j], a[j]
+                for c in range(size, row.shape[0]):
+                    row[c] -= factor * below[c]
+            for c in range(size, row.shape[0]):
+                row[c] *= inverse
+        work[:, size : size + n, e] = -a[:size, size : size + n]
+        right[index] = -a[:size, size + n : size + 2 * n]
+        work[:, size + n :, e] = -a[:size, size + 2 * n :]
     return regular
 
 
 def eliminate_stages(
-    widths: Array, matrix: Array, points: Array, n: int, m: int, plan: Plan
-) -> tuple[LocalFactors, bool]:
-    """Eliminate the stages of all elements; False where one of them is singular. points (rows, columns, k, N)."""
+    widths: Array, weights: Array, matrix: Array, points: Array, jumps: Array, m: int, plan: Plan
+) -> tuple[LocalFactors, Array, bool]:
+    """Factors, relations (N, n, 2n + n_s) of all elements, and whether all are regular.
+
+    points (rows, columns, k, N), of which the first m rows are equations; jumps (N, n, n_s): scalars in continuity rows.
+    """
     _, columns, k, n_elements = points.shape
-    size = k * m
+    n, size = jumps.shape[1], k * m
     work = np.zeros((size, size + columns - m, n_elements))
     pattern = np.zeros(work.shape[:2], dtype=np.bool_)
     scale, growth = np.empty((size, n_elements)), np.zeros(n_elements)
     fill(widths, matrix, points, n, plan.position, plan.partner, work, pattern, scale)
     eliminate(work, pattern, growth)
-    redone = np.flatnonzero(~(growth <= GROWTH_LIMIT))
-    dense_lu = np.empty((len(redone), size, size))
-    dense_pivot = np.empty((len(redone), size), dtype=np.int64)
+    relations = _relations(widths, weights, plan.position, work, jumps, m)
+    growth[[0, -1]] = np.inf  # where poles lie
+    pivoted = np.flatnonzero(~(growth <= GROWTH_LIMIT))
+    count = len(pivoted)
+    lu, exchanges = np.zeros((count, size + n, size)), np.zeros((count, size), dtype=np.int64)
+    right, relation_scale = np.zeros((count, size, n)), np.ones((count, n))
     regular = True
-    if len(redone):
-        filled = np.zeros_like(work)
-        fill(widths, matrix, points, n, plan.position, plan.partner, filled, np.zeros_like(pattern), scale)
+    if count:
+        filled = np.zeros((*work.shape[:2], count))
+        some, some_widths = np.ascontiguousarray(points[..., pivoted]), widths[pivoted]
+        fill(
+            some_widths,
+            matrix,
+            some,
+            n,
+            plan.position,
+            plan.partner,
+            filled,
+            np.zeros_like(pattern),
+            np.empty((size, count)),
+        )
         pattern[:, size:] = True
-        regular = redo(work, np.ascontiguousarray(filled[:, :, redone]), redone, dense_lu, dense_pivot)
-    return LocalFactors(work, pattern, scale, redone, dense_lu, dense_pivot), regular
+        regular = _eliminate_pivoted(
+            widths, weights, plan.position, filled, jumps, m, work, pivoted, lu, exchanges, right, relations, relation_scale
+        )  # fmt: skip
+    factors = LocalFactors(work, pattern, scale, pivoted, lu, exchanges, right, relation_scale)
+    return factors, relations, regular
 
 
 @compiled
-def solve_stages(work, pattern, scale, redone, dense_lu, dense_pivot, position, partner, rhs):  # type: ignore[no-untyped-def]
-    """The stage solution (k m, N) in pivot order for right-hand sides rhs (N k m,) at fixed nodes and scalars."""
+def solve_stages(  # type: ignore[no-untyped-def]
+    work, pattern, scale, pivoted, lu, exchanges, right, relation_scale, position, partner, widths, weights, equations,
+    continuity,
+):  # fmt: skip
+    """Stages (k m, N), in pivot order, at vanishing end values and scalars, and right-hand sides of the relations (N, n)."""
     size, n_elements = scale.shape
-    m = partner.shape[0]
+    m, n = partner.shape[0], right.shape[2]
     x = np.empty((size, n_elements))
     for j in range(size // m):
         for row in range(m):
             i = position[j * m + partner[row]]
             for e in range(n_elements):
-                x[i, e] = rhs[e * size + j * m + row] * scale[i, e]
-    start = np.empty((redone.shape[0], size))
-    for index in range(redone.shape[0]):
+                x[i, e] = equations[e * size + j * m + row] * scale[i, e]
+    start = np.empty((pivoted.shape[0], size + n))
+    for index in range(pivoted.shape[0]):
+        e = pivoted[index]
         for i in range(size):
-            start[index, i] = x[i, redone[index]]
+            start[index, i] = x[i, e]
+        for i in range(n):
+            start[index, size + i] = continuity[e * n + i]
     for i in range(size):
         target = x[i]
         for j in range(i):
@@ -353,9 +354,18 @@ def solve_stages(work, pattern, scale, redone, dense_lu, dense_pivot, position, 
         pivot = work[i, i]
         for e in range(n_elements):
             target[e] /= pivot[e]
-    for index in range(redone.shape[0]):
-        forward(dense_lu[index], dense_pivot[index], start[index])
-        backward(dense_lu[index], size, start[index])
+    defect = continuity.copy().reshape(n_elements, n)
+    for j in range(size // m):
+        for i in range(n):
+            source = x[position[j * m + i]]
+            for e in range(n_elements):
+                defect[e, i] += widths[e] * weights[j] * source[e]
+    for index in range(pivoted.shape[0]):
+        e = pivoted[index]
+        forward(lu[index], exchanges[index], start[index])
+        for i in range(n):
+            defect[e, i] = relation_scale[index, i] * start[index, size + i]
+        backward(lu[index], size, start[index])
         for i in range(size):
-            x[i, redone[index]] = start[index, i]
-    return x
+            x[i, e] = start[index, i]
+    return x, defect

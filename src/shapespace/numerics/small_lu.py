@@ -1,0 +1,85 @@
+"""Small dense systems in numba: LU with row pivoting, and its two triangular solves."""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+# Contraction to fused multiply-adds and reassociated sums are allowed, but NaN and infinity keep their meaning.
+compiled = njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
+
+
+@compiled
+def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]
+    """LU in place of the first len(pivot) columns of a (rows, cols), pivots from the first n_pivot_rows rows.
+
+    Four columns at a time: one pass over the rest of a row then does four updates. False where a pivot vanishes.
+    """
+    rows, cols = a.shape
+    size = pivot.shape[0]
+    for start in range(0, size, 4):
+        stop = min(start + 4, size)
+        for j in range(start, stop):
+            best, p = abs(a[j, j]), j
+            for i in range(j + 1, n_pivot_rows):
+                if abs(a[i, j]) > best:
+                    best, p = abs(a[i, j]), i
+            pivot[j] = p
+            if not best > 1e-300:
+                return False
+            if p != j:
+                for c in range(cols):
+                    a[j, c], a[p, c] = a[p, c], a[j, c]
+            inverse = 1.0 / a[j, j]
+            for i in range(j + 1, rows):
+                factor = a[i, j] * inverse
+                a[i, j] = factor
+                for c in range(j + 1, stop):
+                    a[i, c] -= factor * a[j, c]
+        for i in range(start + 1, stop):
+            for j in range(start, i):
+                factor = a[i, j]
+                for c in range(stop, cols):
+                    a[i, c] -= factor * a[j, c]
+        if stop - start == 4:
+            for i in range(stop, rows):
+                f0, f1, f2, f3 = a[i, start], a[i, start + 1], a[i, start + 2], a[i, start + 3]
+                for c in range(stop, cols):
+                    a[i, c] -= f0 * a[start, c] + f1 * a[start + 1, c] + f2 * a[start + 2, c] + f3 * a[start + 3, c]
+        else:
+            for i in range(stop, rows):
+                for j in range(start, stop):
+                    factor = a[i, j]
+                    for c in range(stop, cols):
+                        a[i, c] -= factor * a[j, c]
+    return True
+
+
+@compiled
+def forward(lu, pivot, x):  # type: ignore[no-untyped-def]
+    """Apply the row exchanges, then the inverse unit lower trapezoid of a (rows, columns) LU, to one column in place."""
+    for j in range(pivot.shape[0]):
+        p = pivot[j]
+        if p != j:
+            x[j], x[p] = x[p], x[j]
+    columns = pivot.shape[0]
+    for i in range(1, lu.shape[0]):
+        row = lu[i]
+        total = 0.0
+        for j in range(min(i, columns)):
+            total += row[j] * x[j]
+        x[i] -= total
+
+
+@compiled
+def backward(lu, size, x):  # type: ignore[no-untyped-def]
+    """Solve U x = b in place for the leading upper triangle of order `size`."""
+    for i in range(size - 1, -1, -1):
+        row = lu[i]
+        total = 0.0
+        for j in range(i + 1, size):
+            total += row[j] * x[j]
+        x[i] = (x[i] - total) / row[i]
