@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from tests.dense import NO_PARAMETERS, DenseProblem, at_rest
+from tests.dense import NO_PARAMETERS, DenseLinearisation, DenseProblem, at_rest
 from tests.surfaces import make_engine, march
 
 from shapespace.base.arrays import Array
@@ -98,6 +98,26 @@ def test_factors_of_a_near_state_are_used_and_of_a_far_one_replaced():
     assert root.outcome is Outcome.CONVERGED, root
     assert root.jacobians == problem.calls[0] > 0
     assert np.abs(root.x - [1.0, 2.0]).max() < 1e-8
+
+
+def test_the_error_left_is_a_tenth_of_the_tolerance_with_factors_from_elsewhere():
+    """Twice the true slope halves the error at each correction: not good enough where that is all that is left."""
+    problem, rest = DenseProblem(lambda x, dq, p: x + x**2), at_rest(1)
+    poor = DenseLinearisation(np.array([[2.0]]))
+    for start in np.geomspace(1e-9, 1e-7, 9):
+        root = solve_root(problem, np.array([start]), NO_PARAMETERS, rest, Newton(1e-8), poor)
+        assert root.outcome is Outcome.CONVERGED
+        assert abs(root.x[0]) < 1e-9, f"from {start:.1e} to {root.x[0]:.1e}"
+
+
+def test_noise_ends_the_iteration_below_round_off():
+    """Noise of 1e-9 in F lets corrections shrink no further; a tolerance below asks for no more."""
+    problem = DenseProblem(lambda x, dq, p: x**2 - 2.0 + 1e-9 * np.sin(1e14 * np.real(x)))
+    for start in (1.0, 1.4142, np.sqrt(2.0)):
+        root = solve_root(problem, np.array([start]), NO_PARAMETERS, at_rest(1), Newton(1e-13, round_off=1e-8))
+        assert root.outcome is Outcome.CONVERGED, root
+        assert abs(root.x[0] - np.sqrt(2.0)) < 1e-9
+        assert root.iterations < 8, root
 
 
 @pytest.mark.parametrize("scales", [(1.0, 1e-12), (1e9, 1e-3)])

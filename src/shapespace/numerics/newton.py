@@ -12,9 +12,15 @@ from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
 
 @dataclass(frozen=True)
 class Newton:
-    """Options. tolerance: accepted size of the next correction, in the problem's norm; the error left is far smaller."""
+    """Options. tolerance: accepted size of the last correction, in the problem's norm.
+
+    That correction must be smaller than the one before by `reuse_contraction`, and so is the error left; or else both
+    are below `round_off`, where corrections shrink no more. Factors from another state are not trusted there, as
+    round-off may hide an error that they reduce slowly.
+    """
 
     tolerance: float = 1e-8
+    round_off: float = 1e-12
     max_iterations: int = 25
     min_damping: float = 1e-4
     reuse_contraction: float = 0.1
@@ -74,11 +80,12 @@ def solve_root(
                 return Root(x, Outcome.DIVERGED, iteration, jacobians, size, None)
             linearisation = None
             continue
-        contracts = trial.size <= newton.reuse_contraction * size
         x, residual = trial.x, trial.residual
-        if trial.size <= newton.tolerance and trial.damping == 1.0:
+        contracts = trial.damping == 1.0 and trial.size <= newton.reuse_contraction * size
+        stagnates = jacobians > 0 and not contracts and max(size, trial.size) <= newton.round_off
+        if stagnates or (contracts and trial.size <= newton.tolerance):
             return Root(x + trial.correction, Outcome.CONVERGED, iteration, jacobians, trial.size, linearisation)
-        if contracts and trial.damping == 1.0:
+        if contracts:
             # The simplified correction is the next step with the Jacobian kept.
             step, size = trial.correction, trial.size
         else:
@@ -114,7 +121,7 @@ def _damped_step(
         if np.isfinite(residual).all():
             correction = -linearisation.solve(residual)
             correction_size = problem.norm(correction, x)
-            if correction_size <= max((1.0 - 0.25 * damping) * size, newton.tolerance):
+            if correction_size <= max((1.0 - 0.25 * damping) * size, newton.round_off):
                 return _Trial(trial, residual, correction, correction_size, damping)
         damping *= 0.5
     return None
