@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from shapespace.base.arrays import Array
+from shapespace.base.errors import StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.base.scales import QUANTITIES
 from shapespace.models.open_membrane import local_spontaneous_curvature
@@ -21,8 +22,11 @@ from shapespace.study.store import RunStore
 POINTS = 241
 CONVENTIONS = (
     "u = 0 upper pole or apex, u = 1 lower pole or rim; r' = h cos psi, z' = -h sin psi; outward normal "
-    "(sin psi, cos psi); curvatures positive on a sphere; velocities in the lab frame"
+    "(sin psi, cos psi); curvatures positive on a sphere; velocities in the lab frame; at the initial time, whose state is "
+    "given and not solved for, flow, pressure, local tension and powers are those of the first step"
 )
+_FLOW_FIELDS = ("tangential_velocity", "normal_velocity", "local_tension")
+_FLOW_OBSERVABLES = ("velocity", "pressure", "dissipation", "chemical_power", "external_power")
 
 
 def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome | None) -> xr.Dataset:
@@ -31,18 +35,20 @@ def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome |
     scales = scenario.scales
     times = np.array([frame.time for frame in frames])
     fields = [_fields(engine, frame) for frame in frames]
-    if "velocity" in frames[-1].observables:
-        travelled = _travelled(frames) / scales.factor("length")
+    series = [frame.observables for frame in frames]
+    if frames[0].step == 0.0:
+        fields[0], series[0] = _set_in_motion(fields, series, scenario.model == "open-membrane")
+    if "velocity" in series[-1]:
+        travelled = _travelled(times, np.array([values.get("velocity", 0.0) for values in series]))
+        travelled = travelled / scales.factor("length")
         for column, shift in zip(fields, travelled, strict=True):
             column["axial_position"] = column["axial_position"] + shift
     data = {
         name: (("time", "point"), np.stack([column[name] for column in fields]) * scales.factor(name))
         for name in fields[0]
     }
-    names = dict.fromkeys(name for frame in frames for name in frame.observables)
-    observables = {
-        name: ("time", np.array([frame.observables.get(name, np.nan) for frame in frames])) for name in names
-    }
+    names = dict.fromkeys(name for values in series for name in values)
+    observables = {name: ("time", np.array([values.get(name, np.nan) for values in series])) for name in names}
     dataset = xr.Dataset({**data, **observables}, coords={"time": times})
     for name, variable in dataset.variables.items():
         quantity = QUANTITIES[str(name)]
@@ -58,17 +64,39 @@ def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome |
 
 
 def open_dataset(path: str | Path) -> xr.Dataset:
-    """The dataset of a stored run, finished or not."""
+    """The dataset of a stored run, finished or not. StoreError where there is none, or nothing in it yet."""
     store = RunStore.open(path)
+    if not len(store):
+        raise StoreError(f"{path}: holds no time step yet; continue the run with --resume.")
     dataset = make_dataset(store.scenario, (store.read(i) for i in range(len(store))), store.outcome)
     dataset.attrs |= {"created": store.created, "shapespace_version": store.versions["shapespace"]}
     return dataset
 
 
-def _travelled(frames: list[Frame]) -> Array:
+def _set_in_motion(
+    fields: list[dict[str, Array]], series: list[dict[str, float]], is_open: bool
+) -> tuple[dict[str, Array], dict[str, float]]:
+    """Fields and observables of the initial frame with what the force balance gives: to the length of the first step,
+    the values after it. Where no step was taken they are not known, NaN and absent.
+    """
+    field, values = dict(fields[0]), dict(series[0])
+    observables = (*_FLOW_OBSERVABLES, *(["tension_pole"] if is_open else []))  # elsewhere it follows from c
+    after = fields[1] if len(fields) > 1 else None
+    for name in _FLOW_FIELDS:
+        if name in field:
+            u = field["mesh_coordinate"]
+            field[name] = (
+                np.full_like(u, np.nan) if after is None else np.interp(u, after["mesh_coordinate"], after[name])
+            )
+    for name in observables:
+        values.pop(name, None)
+        if after is not None and name in series[1]:
+            values[name] = series[1][name]
+    return field, values
+
+
+def _travelled(times: Array, speeds: Array) -> Array:
     """Distance (frames,) that the comoving frame has swum, by the trapezoidal rule over the steps."""
-    times = np.array([frame.time for frame in frames])
-    speeds = np.array([frame.observables.get("velocity", 0.0) for frame in frames])
     return np.concatenate([[0.0], np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * np.diff(times))])
 
 

@@ -103,9 +103,7 @@ def _draw_twin(axes: Axes, run: Run, twin: str) -> None:
     right = axes.twinx()
     right.spines["right"].set_visible(True)
     if twin == GROWTH:
-        values = run.fields["normal_velocity"][:, 0].copy()
-        if not run.fields["normal_velocity"][0].any():
-            values[0] = np.nan  # the initial state has no velocity yet: it is given, not solved for
+        values = run.fields["normal_velocity"][:, 0]
         text = f"growth speed ({style.units_of(run.dataset['normal_velocity'])})"
     else:
         values = observable(run.dataset, twin)
