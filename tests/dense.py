@@ -21,6 +21,10 @@ class DenseLinearisation(AbstractLinearisation):
     def is_singular(self) -> bool:
         return not np.isfinite(self.matrix).all() or not np.linalg.cond(self.matrix) < 1e15
 
+    @property
+    def sign(self) -> float:
+        return float(np.linalg.slogdet(self.matrix).sign)
+
     def solve(self, residual: Array) -> Array:
         return np.asarray(np.linalg.solve(self.matrix, residual))
 

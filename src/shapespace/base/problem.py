@@ -1,7 +1,8 @@
 """What analysis may know of a problem: F(x, dq/dt; p) = 0 with stored quantities q(x).
 
 Time enters only through q: dynamics replaces dq/dt by a backward difference, stationary states set it to zero, spectra
-linearise it (mass action dF/d(dq/dt) dq/dx). Ordinary F(x, p) = M dx/dt is the case q = x.
+linearise it: a perturbation growing as e^(s t) obeys (J + s B) dx = 0 with the mass action B = dF/d(dq/dt) dq/dx. Ordinary
+M dx/dt = G(x, p) is the case q = x, F = M dq/dt - G.
 """
 
 from abc import ABC, abstractmethod
@@ -17,18 +18,37 @@ class Rate:
     coefficient: float
     history: Array
 
+    @classmethod
+    def of_growth(cls, stored: Array, growth: float = 0.0) -> "Rate":
+        """dq/dt = growth (q(x) - stored): rest at a state with these stored quantities, where the Jacobian is J + growth B."""
+        return cls(growth, -growth * stored)
+
+
+@dataclass(frozen=True)
+class Border:
+    """Extra columns (m, n), rows (m, n) and corner (m, m) of the matrix [[J, columns^T], [rows, corner]]."""
+
+    columns: Array
+    rows: Array
+    corner: Array
+
 
 class AbstractLinearisation(ABC):
-    """A factorised Jacobian of F over x at one state, for a fixed coefficient of the rate."""
+    """A factorised Jacobian of F over x, perhaps bordered, at one state, for a fixed coefficient of the rate."""
 
     @property
     @abstractmethod
     def is_singular(self) -> bool:
         """True where no unique solution exists to working accuracy."""
 
+    @property
+    @abstractmethod
+    def sign(self) -> float:
+        """Sign of the determinant, up to a factor that the discretisation's size determines; 0 or NaN where singular."""
+
     @abstractmethod
     def solve(self, residual: Array) -> Array:
-        """The x-increment dx (n,) with J dx = residual (n,)."""
+        """The increment dx (n + m,) with J dx = residual (n + m,), m being the width of the border."""
 
 
 class AbstractProblem(ABC):
@@ -59,5 +79,39 @@ class AbstractProblem(ABC):
         return self
 
     def carried(self, x: Array, other: "AbstractProblem") -> Array:
-        """The state x of this problem, represented on another discretisation of it."""
+        """The state or increment x of this problem, represented on another discretisation of it."""
         return x
+
+
+class AbstractSmoothProblem(AbstractProblem):
+    """A problem whose solutions can be followed in parameters and judged: borders and derivatives beyond the Jacobian."""
+
+    @abstractmethod
+    def linearise(
+        self, x: Array, p: Array, rate: Rate, border: Border | None = None
+    ) -> tuple[Array, AbstractLinearisation]:
+        """F (n,) and its factorised Jacobian at x, with the border where one is given."""
+
+    @abstractmethod
+    def derivative(self, x: Array, p: Array, dx: Array, dp: Array) -> Array:
+        """F_x dx + F_p dp (n,) at rest."""
+
+    @abstractmethod
+    def second_derivative(self, x: Array, p: Array, one: Array, dp: Array, other: Array, ep: Array) -> Array:
+        """The second derivative of F at rest along (one, dp) and (other, ep), (n,)."""
+
+    @abstractmethod
+    def mass(self, x: Array, p: Array, dx: Array) -> Array:
+        """The mass action B dx = dF/d(dq/dt) dq/dx dx (n,) at rest."""
+
+    @abstractmethod
+    def weights(self, x: Array) -> Array:
+        """w (n,), not negative: sum_i w_i a_i b_i is an inner product of increments near x that no discretisation changes."""
+
+    def refined(self) -> "AbstractSmoothProblem | None":
+        """The same problem on a discretisation about twice as fine, to estimate errors; None where there is none."""
+        return None
+
+    def reflected(self, x: Array, increment: bool = False) -> Array | None:
+        """The mirror image of a state, or of an increment, under the problem's symmetry; None without one."""
+        return None

@@ -1,168 +1,24 @@
 """Gauss collocation of an AbstractSystem: residual, structured Jacobian and stored quantities on a given mesh."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
-from typing import NamedTuple
+from functools import cached_property
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 
 from shapespace.base.arrays import Array, Traced
-from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
+from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Border, Rate
 from shapespace.numerics import condensation
 from shapespace.numerics.adaptation import adapted_mesh
+from shapespace.numerics.border import with_border
 from shapespace.numerics.gauss import gauss_rule
+from shapespace.numerics.pointwise import Density, Functions, compiled_functions
 from shapespace.numerics.small_lu import compiled
 from shapespace.numerics.state import State
 from shapespace.numerics.system import AbstractSystem
 
-Density = Callable[..., dict[str, Traced]]
 RELATIVE_FLOOR = 1.0
 """Fields and scalars smaller than this are measured absolutely in norms; problems are dimensionless and of order one."""
-
-
-class _Points(NamedTuple):
-    """What a packed vector x says at the points: rows (N k, 2n + n_a + n_s) of (slope, algebraic, field, scalars)."""
-
-    rows: Traced
-    ends: Traced
-    u: Traced
-    scalars: Traced
-    continuity: Traced
-    weights: Traced
-
-
-def _points(system: AbstractSystem, k: int, mesh: Traced, x: Traced) -> _Points:
-    """Unpack x = (nodes, slopes, algebraic, scalars) on a mesh and lay it out point by point, element after element."""
-    n, n_a, elements = len(system.fields), len(system.algebraic), mesh.shape[0] - 1
-    cuts = np.cumsum([(elements + 1) * n, elements * k * n, elements * k * n_a])
-    nodes, slopes, algebraic, scalars = jnp.split(x, cuts)
-    nodes, slopes = nodes.reshape(-1, n), slopes.reshape(elements, k, n)
-    rule, widths = gauss_rule(k), mesh[1:] - mesh[:-1]
-    values = nodes[:-1, None] + widths[:, None, None] * jnp.einsum("jl,eln->ejn", rule.matrix, slopes)
-    points = elements * k
-    spread = jnp.broadcast_to(scalars, (points, scalars.shape[0]))
-    flat = (slopes.reshape(points, n), algebraic.reshape(points, n_a), values.reshape(points, n), spread)
-    continuity = nodes[1:] - nodes[:-1] - widths[:, None] * jnp.einsum("l,eln->en", rule.weights, slopes)
-    return _Points(
-        rows=jnp.concatenate(flat, axis=1),
-        ends=jnp.concatenate([nodes[0], nodes[-1], scalars]),
-        u=(mesh[:-1, None] + widths[:, None] * rule.points).ravel(),
-        scalars=scalars,
-        continuity=continuity.ravel(),
-        weights=(widths[:, None] * rule.weights).ravel(),
-    )
-
-
-def _split_row(system: AbstractSystem, v: Traced) -> tuple[Traced, Traced, Traced, Traced]:
-    """(slope, algebraic, field, scalars) of one point."""
-    n, n_a = len(system.fields), len(system.algebraic)
-    return v[:n], v[n : n + n_a], v[n + n_a : 2 * n + n_a], v[2 * n + n_a :]
-
-
-def _point_rows(
-    system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, u: Traced, p: Traced
-) -> Traced:
-    """Equations and integrands at one point as a function of its row v."""
-    dy, a, y, s = _split_row(system, v)
-    dq = coefficient * system.stored(y, s) + history
-    return jnp.concatenate([system.equations(dy, y, a, s, dq, u, p), system.integrands(dy, y, a, s, u, p)])
-
-
-def _end_rows(system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, p: Traced) -> Traced:
-    """End conditions as a function of (y(0), y(1), scalars)."""
-    n = len(system.fields)
-    y0, y1, s = v[:n], v[n : 2 * n], v[2 * n :]
-    dq0 = coefficient * system.stored(y0, s) + history[0]
-    dq1 = coefficient * system.stored(y1, s) + history[1]
-    return system.end_conditions(y0, y1, s, dq0, dq1, p)
-
-
-def _assemble(system: AbstractSystem, points: _Points, rows: Traced, ends: Traced, p: Traced) -> Traced:
-    """The flat residual: equations, continuity, end conditions, integral conditions."""
-    n_rows = len(system.fields) + len(system.algebraic)
-    integrals = points.weights @ rows[:, n_rows:] - system.targets(points.scalars, p)
-    return jnp.concatenate([rows[:, :n_rows].ravel(), points.continuity, ends, integrals])
-
-
-def _residual(
-    system: AbstractSystem, k: int, mesh: Traced, x: Traced, history: Traced, coefficient: Traced, p: Traced
-) -> Traced:
-    points = _points(system, k, mesh, x)
-    history = history.reshape(points.rows.shape[0] + 2, -1)
-    rows = jax.vmap(lambda v, q, u: _point_rows(system, v, q, coefficient, u, p))(points.rows, history[:-2], points.u)
-    return _assemble(system, points, rows, _end_rows(system, points.ends, history[-2:], coefficient, p), p)
-
-
-def _linearised(
-    system: AbstractSystem, k: int, mesh: Traced, x: Traced, history: Traced, coefficient: Traced, p: Traced
-) -> tuple[Traced, Traced, Traced, Traced]:
-    """The flat residual, and the Jacobian by blocks: points (rows, columns, k, N), ends, targets."""
-    points = _points(system, k, mesh, x)
-    history = history.reshape(points.rows.shape[0] + 2, -1)
-
-    def rows(v: Traced, q: Traced, u: Traced) -> tuple[Traced, Traced]:
-        value = _point_rows(system, v, q, coefficient, u, p)
-        return value, value
-
-    def ends(v: Traced) -> Traced:
-        return _end_rows(system, v, history[-2:], coefficient, p)
-
-    # Points run along the last axis, in the order (stage, element), which is what the elimination vectorises over.
-    jacobian, value = jax.vmap(jax.jacfwd(rows, has_aux=True), out_axes=(-1, 0))(points.rows, history[:-2], points.u)
-    jacobian = jacobian.reshape(*jacobian.shape[:2], mesh.shape[0] - 1, k).swapaxes(2, 3)
-    flat = _assemble(system, points, value, ends(points.ends), p)
-    return flat, jacobian, jax.jacfwd(ends)(points.ends), jax.jacfwd(lambda s: system.targets(s, p))(points.scalars)
-
-
-def _integrals(
-    system: AbstractSystem, k: int, density: Density, mesh: Traced, x: Traced, history: Traced, c: Traced, p: Traced
-) -> tuple[dict[str, Traced], dict[str, Traced]]:
-    """Integrals of named densities, and their largest values among the Gauss points."""
-    points = _points(system, k, mesh, x)
-    history = history.reshape(points.rows.shape[0] + 2, -1)
-
-    def at(v: Traced, q: Traced) -> dict[str, Traced]:
-        dy, a, y, s = _split_row(system, v)
-        return density(system, dy, y, a, s, c * system.stored(y, s) + q, p)
-
-    values = jax.vmap(at)(points.rows, history[:-2])
-    return {name: points.weights @ f for name, f in values.items()}, {name: f.max() for name, f in values.items()}
-
-
-def _stored(system: AbstractSystem, k: int, mesh: Traced, x: Traced) -> Traced:
-    """q at the points and at both ends, flat."""
-    points, n = _points(system, k, mesh, x), len(system.fields)
-
-    def at(v: Traced) -> Traced:
-        _, _, y, s = _split_row(system, v)
-        return system.stored(y, s)
-
-    ends = points.ends
-    at_ends = [system.stored(ends[:n], ends[2 * n :]), system.stored(ends[n : 2 * n], ends[2 * n :])]
-    return jnp.concatenate([jax.vmap(at)(points.rows), jnp.stack(at_ends)]).ravel()
-
-
-class _Functions(NamedTuple):
-    """The functions above, compiled for one system and degree; they compile again for each number of elements."""
-
-    residual: Callable[..., Traced]
-    linearised: Callable[..., tuple[Traced, ...]]
-    integrals: Callable[..., tuple[dict[str, Traced], dict[str, Traced]]]
-    stored: Callable[..., Traced]
-
-
-@cache
-def _functions(system: AbstractSystem, k: int) -> _Functions:
-    """Compiled functions of arrays only: looking up a system at each call would cost more than small evaluations."""
-    return _Functions(
-        residual=jax.jit(partial(_residual, system, k)),
-        linearised=jax.jit(partial(_linearised, system, k)),
-        integrals=jax.jit(partial(_integrals, system, k), static_argnums=0),
-        stored=jax.jit(partial(_stored, system, k)),
-    )
 
 
 @compiled
@@ -195,13 +51,18 @@ class CollocationLinearisation(AbstractLinearisation):
         """A pivot vanished or is not finite."""
         return self.factors.singular
 
+    @property
+    def sign(self) -> float:
+        """Of the determinant, up to a factor that N and k determine."""
+        return condensation.determinant_sign(self.factors)
+
     def solve(self, residual: Array) -> Array:
         """J dx = residual."""
         return condensation.solve(self.factors, residual)
 
 
 @dataclass(frozen=True)
-class CollocationProblem(AbstractProblem):
+class CollocationProblem(AbstractSmoothProblem):
     """An AbstractSystem on a mesh with k Gauss points per element; x packs nodes, slopes, algebraic fields and scalars."""
 
     system: AbstractSystem
@@ -248,9 +109,9 @@ class CollocationProblem(AbstractProblem):
         return np.ones(self.elements * self.degree + 2), np.repeat(self._widths, self.degree)
 
     @cached_property
-    def functions(self) -> _Functions:
+    def functions(self) -> Functions:
         """Compiled evaluations; arguments (mesh, x, history, coefficient, p)."""
-        return _functions(self.system, self.degree)
+        return compiled_functions(self.system, self.degree)
 
     @cached_property
     def _device_mesh(self) -> Traced:
@@ -260,13 +121,33 @@ class CollocationProblem(AbstractProblem):
         """Equations at the Gauss points, continuity, end conditions, integral conditions."""
         return np.asarray(self.functions.residual(self._device_mesh, x, rate.history, rate.coefficient, p))
 
-    def linearise(self, x: Array, p: Array, rate: Rate) -> tuple[Array, CollocationLinearisation]:
-        """Residual and factorised Jacobian."""
+    def linearise(
+        self, x: Array, p: Array, rate: Rate, border: Border | None = None
+    ) -> tuple[Array, CollocationLinearisation]:
+        """Residual and factorised Jacobian. A border's columns become scalars, its rows integral conditions."""
         out = self.functions.linearised(self._device_mesh, x, rate.history, rate.coefficient, p)
-        residual, points, ends, targets = (np.asarray(part) for part in out)
+        residual, *blocks = (np.asarray(part) for part in out)
         rule = gauss_rule(self.degree)
-        factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n)
+        points, ends, targets = blocks
+        extra: list[Array] = []
+        if border is not None:
+            points, ends, targets, *extra = with_border(
+                border, self._widths, rule.weights, self.n, points, ends, targets
+            )
+        factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *extra)
         return residual, CollocationLinearisation(self, factors)
+
+    def derivative(self, x: Array, p: Array, dx: Array, dp: Array) -> Array:
+        """F_x dx + F_p dp at rest, flat as the residual."""
+        return np.asarray(self.functions.derivative(self._device_mesh, x, p, dx, dp))
+
+    def second_derivative(self, x: Array, p: Array, one: Array, dp: Array, other: Array, ep: Array) -> Array:
+        """F'' along (one, dp) and (other, ep) at rest, flat as the residual."""
+        return np.asarray(self.functions.second_derivative(self._device_mesh, x, p, one, dp, other, ep))
+
+    def mass(self, x: Array, p: Array, dx: Array) -> Array:
+        """dF/d(dq/dt) dq/dx dx at rest, flat as the residual."""
+        return np.asarray(self.functions.mass(self._device_mesh, x, p, dx))
 
     def stored(self, x: Array, p: Array) -> Array:
         """q at the Gauss points and at both ends, flattened."""
@@ -300,6 +181,18 @@ class CollocationProblem(AbstractProblem):
         scalars = _largest_relative(dx[c:], x[c:], len(x) - c, ones)
         return float(max(nodes, slopes, algebraic, scalars))
 
+    def weights(self, x: Array) -> Array:
+        """Of node values by the trapezoidal rule over u and of scalars, each relative to its largest value (or one)."""
+        nodes = x[: (self.elements + 1) * self.n].reshape(-1, self.n)
+        scale = np.maximum(np.abs(nodes).max(axis=0), RELATIVE_FLOOR)
+        shares = 0.5 * (np.append(self._widths, 0.0) + np.append(0.0, self._widths))
+        weights = np.zeros_like(x)
+        weights[: nodes.size] = (shares[:, None] / scale**2).ravel()
+        scalars = len(self.system.scalars)
+        if scalars:
+            weights[-scalars:] = 1.0 / np.maximum(np.abs(x[-scalars:]), RELATIVE_FLOOR) ** 2
+        return weights
+
     def stored_norm(self, dq: Array, q: Array) -> float:
         """Largest change of any stored quantity relative to its largest value (or one)."""
         ones, _ = self._point_weights
@@ -318,3 +211,14 @@ class CollocationProblem(AbstractProblem):
     def on_mesh(self, mesh: Array) -> "CollocationProblem":
         """The same problem on another mesh."""
         return replace(self, mesh=mesh)
+
+    def refined(self) -> "CollocationProblem":
+        """On a mesh with every element halved."""
+        return self.on_mesh(np.sort(np.concatenate([self.mesh, 0.5 * (self.mesh[1:] + self.mesh[:-1])])))
+
+    def reflected(self, x: Array, increment: bool = False) -> Array | None:
+        """The mirror image of a state, or of an increment, under the system's symmetry."""
+        symmetry = self.system.symmetry
+        if symmetry is None:
+            return None
+        return self.pack(self.unpack(x).reflected(symmetry, increment).on_mesh(self.mesh))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from shapespace.base.arrays import Array
 from shapespace.numerics.gauss import GaussRule, gauss_rule
+from shapespace.numerics.system import Symmetry
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,16 @@ class State:
         missing = np.diff(nodes, axis=0) / widths[:, None] - np.einsum("l,eln->en", self.rule.weights, slopes)
         algebraic = self.algebraic_values(points).reshape(len(widths), k, -1)
         return State(mesh, nodes, slopes + missing[:, None], algebraic, self.scalars.copy())
+
+    def reflected(self, symmetry: Symmetry, increment: bool = False) -> "State":
+        """The image of a state (of an increment: without offsets) under a symmetry; on the mirrored mesh if it flips u."""
+        factors = np.array(symmetry.factors)
+        nodes = factors * self.nodes + (0.0 if increment else np.array(symmetry.offsets))
+        slopes, algebraic = factors * self.slopes, np.array(symmetry.algebraic) * self.algebraic
+        scalars = np.array(symmetry.scalars) * self.scalars
+        if not symmetry.flips:
+            return State(self.mesh, nodes, slopes, algebraic, scalars)
+        return State(1.0 - self.mesh[::-1], nodes[::-1], -slopes[::-1, ::-1], algebraic[::-1, ::-1], scalars)
 
 
 def state_from_functions(

@@ -1,10 +1,25 @@
 """A boundary value problem on u in [0, 1], stated point by point: what collocation discretises."""
 
 from abc import abstractmethod
+from dataclasses import dataclass
 
 import equinox as eqx
 
 from shapespace.base.arrays import Traced
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """A map of states that turns solutions into solutions, and is its own inverse.
+
+    y(u) -> factors y(u or 1 - u) + offsets, a -> algebraic a, s -> scalars s. flips: whether u -> 1 - u.
+    """
+
+    flips: bool
+    factors: tuple[float, ...]
+    offsets: tuple[float, ...]
+    algebraic: tuple[float, ...] = ()
+    scalars: tuple[float, ...] = ()
 
 
 class AbstractSystem(eqx.Module):
@@ -18,6 +33,11 @@ class AbstractSystem(eqx.Module):
     algebraic: eqx.AbstractVar[tuple[str, ...]]
     scalars: eqx.AbstractVar[tuple[str, ...]]
     parameters: eqx.AbstractVar[tuple[str, ...]]
+
+    @property
+    def symmetry(self) -> Symmetry | None:
+        """The reflection that the system has, if any."""
+        return None
 
     @abstractmethod
     def equations(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, u: Traced, p: Traced) -> Traced:
