@@ -83,8 +83,8 @@ class AbstractProblem(ABC):
         return x
 
 
-class AbstractSmoothProblem(AbstractProblem):
-    """A problem whose solutions can be followed in parameters and judged: borders and derivatives beyond the Jacobian."""
+class AbstractContinuableProblem(AbstractProblem):
+    """A problem whose solutions can be followed in parameters."""
 
     @abstractmethod
     def linearise(
@@ -97,16 +97,20 @@ class AbstractSmoothProblem(AbstractProblem):
         """F_x dx + F_p dp (n,) at rest."""
 
     @abstractmethod
+    def weights(self, x: Array) -> Array:
+        """w (n,), not negative: sum_i w_i a_i b_i is an inner product of increments near x that no discretisation changes."""
+
+
+class AbstractSmoothProblem(AbstractContinuableProblem):
+    """A problem whose singular points can be located and whose solutions can be judged."""
+
+    @abstractmethod
     def second_derivative(self, x: Array, p: Array, one: Array, dp: Array, other: Array, ep: Array) -> Array:
         """The second derivative of F at rest along (one, dp) and (other, ep), (n,)."""
 
     @abstractmethod
     def mass(self, x: Array, p: Array, dx: Array) -> Array:
         """The mass action B dx = dF/d(dq/dt) dq/dx dx (n,) at rest."""
-
-    @abstractmethod
-    def weights(self, x: Array) -> Array:
-        """w (n,), not negative: sum_i w_i a_i b_i is an inner product of increments near x that no discretisation changes."""
 
     def refined(self) -> "AbstractSmoothProblem | None":
         """The same problem on a discretisation about twice as fine, to estimate errors; None where there is none."""

@@ -1,0 +1,142 @@
+"""Locate and classify folds and branch points, with an error of the parameter; directions of the branches that meet there."""
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from shapespace.analysis.singular import SingularProblem
+from shapespace.base.arrays import Array
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import AbstractProblem, AbstractSmoothProblem, Rate
+from shapespace.numerics.newton import Newton, solve_root
+
+LOCATION = Newton(tolerance=1e-10, max_iterations=30)
+LARGEST_GAP = 1e-3
+"""Branches that pass each other at this distance, relative to the state, count as crossing: discretisation breaks a crossing
+that no symmetry protects."""
+SAFETY = 2.0
+"""Of the parameter's error, over its change on a finer mesh, which falls short of it where convergence is slow."""
+TILT = 1e-6
+"""A branch whose unit tangent has a smaller parameter component than this leaves a pitchfork."""
+
+
+class Kind(StrEnum):
+    """Kinds of singular points."""
+
+    FOLD = "fold"
+    PITCHFORK = "pitchfork"
+    TRANSCRITICAL = "transcritical"
+    BRANCH_POINT = "branch-point"
+
+
+@dataclass(frozen=True)
+class SingularPoint:
+    """A singular point of a branch in parameter `index`.
+
+    p: complete, at the point. parameter_error: estimated error of p[index], from the same point on a mesh twice as fine.
+    kernel (1, n) or (2, n + 1): orthonormal, the null vector last. directions (2, n + 1): unit tangents (dx, dparameter)
+    of the two branches through a branch point (a fold has one).
+    """
+
+    kind: Kind
+    problem: AbstractSmoothProblem
+    index: int
+    x: Array
+    p: Array
+    parameter_error: float
+    kernel: Array
+    directions: Array
+
+    @property
+    def parameter(self) -> float:
+        """The parameter's value."""
+        return float(self.p[self.index])
+
+
+def locate_fold(
+    problem: AbstractSmoothProblem, index: int, x: Array, p: Array, tangent: Array
+) -> SingularPoint | Outcome:
+    """The fold near (x, p), where the branch has the tangent dx (n,); an Outcome says why there is none."""
+    start = SingularProblem(problem, index, _unit_vectors(problem, x, tangent[None]))
+    root = solve_root(start, np.append(x, p[index]), p, _rest(problem, x, p), LOCATION)
+    if root.outcome is not Outcome.CONVERGED:
+        return root.outcome
+    final = start.with_kernel(root.x, p)
+    at = final.parameters(root.x, p)
+    directions = np.append(final.kernel[0], 0.0)[None]
+    error = _parameter_error(final, root.x, p)
+    return SingularPoint(Kind.FOLD, problem, index, final.state(root.x), at, error, final.kernel, directions)
+
+
+def locate_branch_point(
+    problem: AbstractSmoothProblem, index: int, x: Array, p: Array, tangent: Array
+) -> SingularPoint | Outcome:
+    """The branch point near (x, p), where one branch has the tangent (dx, dparameter) (n + 1,)."""
+    null = null_vector(problem, x, p, tangent[:-1])
+    kernel = np.stack([tangent, np.append(null, 0.0)])
+    start = SingularProblem(problem, index, kernel)
+    root = solve_root(start, np.append(x, [p[index], 0.0]), p, _rest(problem, x, p), LOCATION)
+    if root.outcome is not Outcome.CONVERGED:
+        return root.outcome
+    final = start.with_kernel(root.x, p)
+    form = final.form(root.x, p)
+    if 2.0 * abs(root.x[-1]) > LARGEST_GAP**2 * np.abs(form).max():
+        return Outcome.DIVERGED
+    directions = branch_directions(form) @ final.kernel
+    if len(directions) < 2:
+        return Outcome.DIVERGED
+    at, error = final.parameters(root.x, p), _parameter_error(final, root.x, p)
+    tilts = np.abs(directions[:, -1]) / max(abs(at[index]), 1.0)
+    kind = Kind.PITCHFORK if tilts.min() < TILT else Kind.TRANSCRITICAL
+    return SingularPoint(kind, problem, index, final.state(root.x), at, error, final.kernel, directions)
+
+
+def null_vector(problem: AbstractSmoothProblem, x: Array, p: Array, away_from: Array) -> Array:
+    """The mode (n,) that grows or decays most slowly, by inverse iteration, made orthogonal to a vector (n,)."""
+    weights = problem.weights(x)
+    _, linearisation = problem.linearise(x, p, _rest(problem, x, p))
+    vector = np.random.default_rng(0).standard_normal(len(x))
+    for _ in range(4):
+        vector = linearisation.solve(problem.mass(x, p, vector))
+        vector = vector - (weights @ (vector * away_from)) / (weights @ away_from**2 + 1e-300) * away_from
+        vector = vector / np.sqrt(weights @ vector**2)
+    return np.asarray(vector)
+
+
+def branch_directions(form: Array) -> Array:
+    """Unit solutions tau (2, 2) of tau^T form tau = 0 for a symmetric form (2, 2); (0, 2) where there is none but zero."""
+    form = 0.5 * (form + form.T)
+    (a, b), c = form[0], form[1, 1]
+    root = b**2 - a * c
+    if root <= 0.0:
+        return np.zeros((0, 2))
+    # The stable one of the two formulas for each root of a t1^2 + 2 b t1 t2 + c t2^2.
+    large = -(b + np.copysign(np.sqrt(root), b))
+    pair = np.array([[large, a], [c, large]])
+    return np.asarray(pair / np.linalg.norm(pair, axis=1)[:, None])
+
+
+def _unit_vectors(problem: AbstractSmoothProblem, x: Array, vectors: Array) -> Array:
+    lengths = np.sqrt((problem.weights(x) * vectors**2).sum(axis=1))
+    return np.asarray(vectors / lengths[:, None])
+
+
+def _parameter_error(final: SingularProblem, big_x: Array, p: Array) -> float:
+    """How far the parameter moves on a mesh twice as fine, and what Newton leaves; NaN where that cannot be found."""
+    value, n = big_x[len(final.state(big_x))], len(final.state(big_x))
+    finer = final.base.refined()
+    left = LOCATION.tolerance * max(abs(value), 1.0)
+    if finer is None:
+        return float(left)
+    kernel = np.stack([np.append(final.base.carried(v[:n], finer), v[n:]) for v in final.kernel])
+    problem = replace(final, base=finer, kernel=kernel)
+    start = final.carried(big_x, problem)
+    root = solve_root(problem, start, p, _rest(problem, start, p), LOCATION)
+    if root.outcome is not Outcome.CONVERGED:
+        return float("nan")
+    return float(SAFETY * abs(root.x[len(problem.state(root.x))] - value) + left)
+
+
+def _rest(problem: AbstractProblem, x: Array, p: Array) -> Rate:
+    return Rate.of_growth(problem.stored(x, p))
