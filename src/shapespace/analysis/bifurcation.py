@@ -5,7 +5,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from shapespace.analysis.singular import SingularProblem
+from shapespace.analysis.singular import SingularProblem, probe
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractProblem, AbstractSmoothProblem, Rate
@@ -15,6 +15,8 @@ LOCATION = Newton(tolerance=1e-10, max_iterations=30)
 LARGEST_GAP = 1e-3
 """Branches that pass each other at this distance, relative to the state, count as crossing: discretisation breaks a crossing
 that no symmetry protects."""
+PROBES = 6
+"""Vectors from which a null direction is guessed."""
 SAFETY = 2.0
 """Of the parameter's error, over its change on a finer mesh, which falls short of it where convergence is slow."""
 TILT = 1e-6
@@ -93,15 +95,22 @@ def locate_branch_point(
 
 
 def null_vector(problem: AbstractSmoothProblem, x: Array, p: Array, away_from: Array) -> Array:
-    """The mode (n,) that grows or decays most slowly, by inverse iteration, made orthogonal to a vector (n,)."""
+    """The unit vector (n,) orthogonal to `away_from` (n,) that J near (x, p) shrinks most, in the problem's inner product.
+
+    The inverse of a nearly singular J sends any vector almost into the null direction: what several such images share
+    is their leading singular vector.
+    """
     weights = problem.weights(x)
     _, linearisation = problem.linearise(x, p, _rest(problem, x, p))
-    vector = np.random.default_rng(0).standard_normal(len(x))
-    for _ in range(4):
-        vector = linearisation.solve(problem.mass(x, p, vector))
-        vector = vector - (weights @ (vector * away_from)) / (weights @ away_from**2 + 1e-300) * away_from
-        vector = vector / np.sqrt(weights @ vector**2)
-    return np.asarray(vector)
+    images = np.stack([linearisation.solve(probe(len(x), number)) for number in range(PROBES)])
+    square = weights @ away_from**2
+    if square > 0.0:
+        images = images - np.outer(images @ (weights * away_from) / square, away_from)
+    images = images / np.sqrt(images**2 @ weights)[:, None]
+    _, _, shared = np.linalg.svd(images * np.sqrt(weights), full_matrices=False)
+    combination = images @ (np.sqrt(weights) * shared[0])
+    vector = combination @ images
+    return np.asarray(vector / np.sqrt(weights @ vector**2))
 
 
 def branch_directions(form: Array) -> Array:

@@ -8,7 +8,7 @@ With bordering rows c_i and a column b the kernel of F_z is read off
 whose matrix M is regular where F_z has d kernel directions; v_i spans the kernel exactly where all g_i = 0. Hence
 
     fold:          z = x,           d = 1,  b = F_lambda:  F(x, lambda) = 0,              g_1 = 0        for (x, lambda)
-    branch point:  z = (x, lambda), d = 2,  b = B v:       F(x, lambda) + sigma b = 0,    g_1 = g_2 = 0  for (x, lambda, sigma)
+    branch point:  z = (x, lambda), d = 2,  b arbitrary:   F(x, lambda) + sigma b = 0,    g_1 = g_2 = 0  for (x, lambda, sigma)
 
 (Govaerts 2000, Ch. 4-6). Newton needs no transposed solves: with M the increment is a particular part plus a combination of
 kernel vectors, and along an increment a
@@ -86,7 +86,7 @@ class SingularProblem(AbstractContinuableProblem):
         if self.is_fold:
             border = Border(slope[None], rows, np.zeros((1, 1)))
         else:
-            unfolding = self.unfolding(x, p)
+            unfolding = probe(len(x))
             corner = np.stack([_parameter_weight(p[self.index]) * self.kernel[:, -1], np.zeros(2)], axis=1)
             border = Border(np.stack([slope, unfolding]), rows, corner)
         residual, linearisation = self.base.linearise(x, p, rate, border)
@@ -94,10 +94,6 @@ class SingularProblem(AbstractContinuableProblem):
             residual = residual + big_x[-1] * unfolding
         solutions = np.stack([linearisation.solve(_unit(len(x) + d, len(x) + i)) for i in range(d)])
         return _Kernel(linearisation, solutions[:, :-1], solutions[:, -1], residual)
-
-    def unfolding(self, x: Array, p: Array) -> Array:
-        """b of a branch point: the mass action on the second kernel vector."""
-        return self.base.mass(x, p, self.kernel[1, : len(x)])
 
     def gradient(self, kernel: _Kernel, big_x: Array, p: Array, dx: Array, dp: Array) -> Array:
         """g_i' (d,) along (dx, dp), dp being complete."""
@@ -129,7 +125,7 @@ class SingularProblem(AbstractContinuableProblem):
         kernel = self._kernel(x, p, Rate.of_growth(self.base.stored(state, full)))
         change = self.base.derivative(state, full, inner, along)
         if not self.is_fold:
-            change = change + dx[-1] * self.unfolding(state, full)
+            change = change + dx[-1] * probe(len(state))
         return np.concatenate([change, self.gradient(kernel, x, p, inner, along)])
 
     def weights(self, x: Array) -> Array:
@@ -239,6 +235,11 @@ def _conditions(
     dp[problem.index] = increment[len(problem.state(x))]
     g = problem.gradient(kernel, x, p, problem.state(increment), dp)
     return np.concatenate([g, border.rows @ increment])
+
+
+def probe(size: int, number: int = 0) -> Array:
+    """A fixed vector (size,) that no left null vector is likely to be orthogonal to."""
+    return np.random.default_rng([size, number]).standard_normal(size)
 
 
 def _parameter_weight(value: float) -> float:
