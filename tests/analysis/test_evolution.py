@@ -170,12 +170,13 @@ def test_a_blow_up_ends_in_a_named_outcome():
 
 
 def test_an_undefined_state_underflows():
-    """A residual that is NaN beyond some state cannot be entered; a fixed step that needs it ends the run."""
+    """A residual that is NaN beyond some state cannot be entered, but for the tolerance of Newton; a fixed step that needs
+    it ends the run."""
     problem = DenseProblem(lambda x, dq, p: dq - 1.0 + 0.0 * np.sqrt(0.5 - x))
     for stepping in ({"tolerance": 1e-4}, {"fixed_step": 0.03}):
         moments, outcome = evolution(problem, [Moment(0.0, problem, np.zeros(1))], 1.0, **stepping)
         assert outcome is Outcome.STEP_UNDERFLOW
-        assert 0.4 < moments[-1].time <= 0.5
+        assert 0.4 < moments[-1].time <= 0.5 + TIGHT.tolerance
 
 
 @dataclass(frozen=True)
@@ -199,7 +200,6 @@ def test_a_start_that_no_step_leaves_underflows(stepping: dict[str, float]):
     assert (outcome, moments) == (Outcome.STEP_UNDERFLOW, [])
 
 
-@pytest.mark.xfail(reason="the first step stays long under the full patience of Newton", strict=False)
 @pytest.mark.parametrize("until", [1e-4, 3e-3, 1.0])
 def test_a_start_that_only_long_steps_leave(until: float):
     """The first step may be longer than asked, but never leads beyond the end."""

@@ -1,7 +1,7 @@
 """Time evolution of F(x, dq/dt; p) = 0 by backward differentiation, at fixed or controlled steps, with events."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -11,13 +11,8 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
 from shapespace.numerics.newton import Newton, Root, solve_root
 
-ROUND_OFF_FACTOR = 1e2
-"""How much a linear solve amplifies round-off, generously: on surfaces by 4 at most, at any step and mesh."""
-
-
 START_LIMIT = 4.0**7
 """How much longer than asked the first step may be where Newton needs it."""
-
 
 STEP_NEWTON = Newton(max_iterations=12, min_damping=1.0 / 32.0)
 """Patience of a time step: where Newton needs more, a shorter step is cheaper."""
@@ -149,15 +144,16 @@ class Evolution:
         Newton then fails at small steps from that state, but not at larger ones, from which smaller ones are reached.
         """
         root, rate = self._solve(problem, step, 1)
-        larger = step
-        while root.outcome is not Outcome.CONVERGED and larger < START_LIMIT * step:
-            larger *= 4.0
+        larger, largest = step, min(START_LIMIT * step, self.until - self._times[0])
+        while root.outcome is not Outcome.CONVERGED and larger < largest:
+            larger = min(4.0 * larger, largest)
             root, rate = self._solve(problem, larger, 1)
         while root.outcome is Outcome.CONVERGED and larger > step:
-            smaller, smaller_rate = self._solve(problem, 0.25 * larger, 1, root.x)
+            shorter = max(0.25 * larger, step)
+            smaller, smaller_rate = self._solve(problem, shorter, 1, root.x)
             if smaller.outcome is not Outcome.CONVERGED:
                 break
-            larger, root, rate = 0.25 * larger, smaller, smaller_rate
+            larger, root, rate = shorter, smaller, smaller_rate
         return (larger if root.outcome is Outcome.CONVERGED else step), root, rate
 
     def _within(self, step: float) -> float:
@@ -182,20 +178,13 @@ class Evolution:
         known = None
         if self._linearisation is not None and abs(self._linearisation[1] / rate.coefficient - 1.0) < 0.2:
             known = self._linearisation[0]
-        newton = self._newton(rate, patient=len(self._times) == 1)
+        newton = Newton(self.newton.tolerance) if len(self._times) == 1 else self.newton
         root = solve_root(problem, guess, self.p, rate, newton, known)
         if root.outcome is not Outcome.CONVERGED and points > 1:
             root = solve_root(problem, self._states[0], self.p, rate, newton)
         if root.linearisation is not None and root.jacobians > 0:
             self._linearisation = (root.linearisation, rate.coefficient)
         return root, rate
-
-    def _newton(self, rate: Rate, patient: bool) -> Newton:
-        """Rates are differences over the step, so velocities carry round-off of eps/step that Newton cannot go below."""
-        floor = ROUND_OFF_FACTOR * np.finfo(float).eps * abs(rate.coefficient)
-        round_off = min(max(self.newton.round_off, floor), 1e-3)
-        newton = Newton() if patient else self.newton
-        return replace(newton, tolerance=self.newton.tolerance, round_off=round_off)
 
     def _local_error(self, problem: AbstractProblem, step: float, order: int, stored: Array) -> float:
         """Estimated local error of the stored quantities, from the predictor through as many moments as there are."""

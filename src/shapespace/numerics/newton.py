@@ -9,18 +9,23 @@ from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, Rate
 
+NEGLIGIBLE = 1e-12
+"""Corrections smaller than this, relative to the unknowns, need no further look."""
+ROUND_OFF_SPREAD = 10.0
+"""Corrections up to this many times a sample of the round-off count as round-off; on surfaces they are 1 to 5 times it."""
+NEAR = 1e-3
+"""Corrections larger than this are never round-off."""
+
 
 @dataclass(frozen=True)
 class Newton:
     """Options. tolerance: accepted size of the last correction, in the problem's norm.
 
-    That correction must be smaller than the one before by `reuse_contraction`, and so is the error left; or else both
-    are below `round_off`, where corrections shrink no more. Factors from another state are not trusted there, as
-    round-off may hide an error that they reduce slowly.
+    That correction must be smaller than the one before by `reuse_contraction`, and so is the error left, unless
+    round-off lets corrections shrink no more. max_iterations, min_damping: patience.
     """
 
     tolerance: float = 1e-8
-    round_off: float = 1e-12
     max_iterations: int = 25
     min_damping: float = 1e-4
     reuse_contraction: float = 0.1
@@ -73,7 +78,14 @@ def solve_root(
         if step is None:
             step = -linearisation.solve(residual)
             size = problem.norm(step, x)
+        if size <= NEGLIGIBLE:
+            return Root(x + step, Outcome.CONVERGED, iteration, jacobians, size, linearisation)
         trial = _damped_step(problem, linearisation, x, p, rate, step, size, newton)
+        contracts = trial is not None and trial.damping == 1.0 and trial.size <= newton.reuse_contraction * size
+        # Factors from another state are not trusted here: round-off may hide an error that they reduce slowly.
+        may_stagnate = not contracts and jacobians > 0 and size <= NEAR
+        if may_stagnate and size <= ROUND_OFF_SPREAD * _round_off(problem, linearisation, x, residual, p, rate):
+            return Root(x + step, Outcome.CONVERGED, iteration, jacobians, size, linearisation)
         step = None
         if trial is None:
             if fresh:
@@ -81,9 +93,7 @@ def solve_root(
             linearisation = None
             continue
         x, residual = trial.x, trial.residual
-        contracts = trial.damping == 1.0 and trial.size <= newton.reuse_contraction * size
-        stagnates = jacobians > 0 and not contracts and max(size, trial.size) <= newton.round_off
-        if stagnates or (contracts and trial.size <= newton.tolerance):
+        if contracts and trial.size <= newton.tolerance:
             return Root(x + trial.correction, Outcome.CONVERGED, iteration, jacobians, trial.size, linearisation)
         if contracts:
             # The simplified correction is the next step with the Jacobian kept.
@@ -91,6 +101,19 @@ def solve_root(
         else:
             linearisation = None
     return Root(x, Outcome.MAX_ITERATIONS, newton.max_iterations, jacobians, size, None)
+
+
+def _round_off(
+    problem: AbstractProblem, linearisation: AbstractLinearisation, x: Array, residual: Array, p: Array, rate: Rate
+) -> float:
+    """A sample of what round-off in F and in the solution makes of a correction at x, in the problem's norm.
+
+    It is what the Jacobian does not explain of the change of F as each unknown moves to the next floating-point number.
+    Velocities are differences over a time step, so it grows as the step shrinks.
+    """
+    moved = np.nextafter(x, np.inf)
+    change = linearisation.solve(problem.residual(moved, p, rate) - residual)
+    return problem.norm(change - (moved - x), x)
 
 
 class _Trial(NamedTuple):
@@ -121,7 +144,7 @@ def _damped_step(
         if np.isfinite(residual).all():
             correction = -linearisation.solve(residual)
             correction_size = problem.norm(correction, x)
-            if correction_size <= max((1.0 - 0.25 * damping) * size, newton.round_off):
+            if correction_size <= (1.0 - 0.25 * damping) * size:
                 return _Trial(trial, residual, correction, correction_size, damping)
         damping *= 0.5
     return None
