@@ -16,6 +16,9 @@ class Outcome(StrEnum):
     NOT_FINITE = "not-finite"
     STEP_UNDERFLOW = "step-underflow"
     MAX_STEPS = "max-steps"
+    REACHED_STOP = "reached-stop"
+    NOT_REACHED = "not-reached"
+    BRANCH_STALLED = "branch-stalled"
 
     @property
     def is_success(self) -> bool:
@@ -28,7 +31,13 @@ class Outcome(StrEnum):
         return _ADVICE[self]
 
 
-_SUCCESS = {Outcome.CONVERGED, Outcome.STATIONARY, Outcome.REACHED_END, Outcome.NECK_CLOSED}
+_SUCCESS = {
+    Outcome.CONVERGED,
+    Outcome.STATIONARY,
+    Outcome.REACHED_END,
+    Outcome.NECK_CLOSED,
+    Outcome.REACHED_STOP,
+}
 
 _ADVICE = {
     Outcome.CONVERGED: "The equations hold to the tolerance.",
@@ -41,6 +50,13 @@ _ADVICE = {
     Outcome.NOT_FINITE: "A NaN or infinity appeared: check the start and the parameters.",
     Outcome.STEP_UNDERFLOW: (
         "The time step fell below its minimum: raise `elements`, loosen `time_tolerance`, or check the parameters."
+    ),
+    Outcome.REACHED_STOP: "The branch came to a value where it was to end.",
+    Outcome.NOT_REACHED: (
+        "Stepping stalled on the way to these parameters: there may be no such state, or a fold lies between; follow the branch."
+    ),
+    Outcome.BRANCH_STALLED: (
+        "The step along the branch fell below its minimum: the branch may end here; if not, refine the mesh or loosen tolerances."
     ),
     Outcome.MAX_STEPS: "The step limit was reached: raise `max_steps` or resume.",
 }
