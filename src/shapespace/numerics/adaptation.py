@@ -9,7 +9,9 @@ from shapespace.numerics.state import State
 UNBALANCED = 3.0
 """A mesh that meets the tolerance is kept until its largest element load exceeds the mean by this factor."""
 WORTHWHILE = 0.8
-"""Moving a balanced mesh at the same size must lower the largest load at least this much: moves cost interpolations."""
+"""Moving a balanced mesh near the tolerance must lower the largest load at least this much: moves cost interpolations."""
+WORTHWHILE_FAR = 0.95
+"""The same far from the tolerance, where any gain counts but that of a mesh which has settled."""
 
 
 def highest_derivative(state: State) -> Array:
@@ -57,7 +59,8 @@ def adapted_mesh(state: State, tolerance: float) -> Array:
         elements = next_size(elements)
         moved = equidistribute(mesh, density, elements)
     balanced = load.max() <= UNBALANCED * load.mean()
-    if elements == len(mesh) - 1 and balanced and _largest_load(mesh, density, moved) > WORTHWHILE * load.max():
+    worthwhile = WORTHWHILE if WORTHWHILE * load.max() <= allowed else WORTHWHILE_FAR
+    if elements == len(mesh) - 1 and balanced and _largest_load(mesh, density, moved) > worthwhile * load.max():
         return mesh
     return symmetrise(moved) if np.allclose(moved, 1.0 - moved[::-1], atol=1e-6) else moved
 
