@@ -17,6 +17,10 @@ from shapespace.study.scenario import scenario
 from shapespace.study.store import RunStore
 
 NAMES = ("guided-division", "polar-swimmer", "membrane-protrusion")
+# A rate of change needs two states, and the flow of the flat disc has no limit at t = 0.
+UNKNOWN_AT_START = {key: {"energy_residual"} for key in NAMES} | {
+    "membrane-protrusion": {"energy_residual", "dissipation", "external_power"}
+}
 FLOW = ("tangential_velocity", "normal_velocity")
 
 
@@ -37,9 +41,8 @@ def test_everything_is_finite_and_says_what_it_is(name: str):
         quantity = QUANTITIES[str(key)]
         assert (variable.attrs["symbol"], variable.attrs["long_name"]) == (quantity.symbol, quantity.meaning)
         assert variable.attrs["units"]
-        if key not in ("neck_radius", "energy_residual"):
-            assert np.isfinite(variable.values).all(), key
-    assert np.isfinite(data["energy_residual"].values[1:]).all()  # of a rate of change, which one state has not
+        if key != "neck_radius":
+            assert np.isfinite(variable.values[1 if key in UNKNOWN_AT_START[name] else 0 :]).all(), key
     assert (data.attrs["scenario"], data.attrs["outcome"]) == (name, "reached-end")
     assert json.loads(data.attrs["parameters"])["until"] == 0.02
 
@@ -76,18 +79,25 @@ def test_surface_moves_at_its_normal_velocity(name: str):
     np.testing.assert_allclose(normal, velocity, atol=0.1 * np.abs(velocity).max())
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", NAMES[:2])
 def test_initial_frame_flows_as_the_first_step_says(name: str):
     frames, data = short_run(name).frames, dataset_of(name)
     assert not frames[0].rates.any(), "the initial state is given, not solved for"
-    for key in (*FLOW, "dissipation", "external_power"):
+    for key in (*FLOW, "pressure", "dissipation", "chemical_power"):
         np.testing.assert_array_equal(data[key].values[0], data[key].values[1])
     assert np.abs(data["normal_velocity"].values[0]).max() > 0.0
     if name == "polar-swimmer":
         # The step is tiny: the flow is that of the force balance at t = 0, as the next step confirms. (A resting sphere
-        # with uniform regulator, as in guided division, flows not at all at t = 0; a flat disc buckles as the root of t.)
+        # with uniform regulator, as in guided division, flows not at all at t = 0.)
         flow = data["normal_velocity"].values
         assert np.abs(flow[2] - flow[0]).max() < 1e-3 * np.abs(flow[0]).max()
+
+
+def test_flat_disc_starts_at_rest():
+    """It buckles as the root of time, so that its flow has no limit at t = 0."""
+    data = dataset_of("membrane-protrusion")
+    assert not any(data[key].values[0].any() for key in FLOW)
+    assert data["normal_velocity"].values[1].max() > 1.0
 
 
 def test_frame_alone_has_no_flow():

@@ -37,6 +37,7 @@ _SYMBOLS = {
     "ring_position": ("u_m", "1"),
     "velocity": ("v_0", "R0/tau"),
     "max_concentration": ("c_max", "c0"),
+    "polarity": ("P", "1"),
 }
 
 
@@ -167,6 +168,7 @@ def _swimmer(scenario: str, slip_time: float, end: float, frames: int, speed: fl
         observables = {
             "ring_position": float(u[np.argmax(fields["concentration"])]),
             "velocity": swim,
+            "polarity": 1.0 - float(fields["meridional_curvature"][0] / fields["meridional_curvature"][-1]),
             "max_concentration": float(fields["concentration"].max()),
             "height": float(z[0] - z[-1]),
             "equator_radius": float(np.interp(0.5, u, fields["radius"])),

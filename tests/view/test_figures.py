@@ -23,7 +23,7 @@ from shapespace.view.snapshot import make_camera, make_surface
 CURVES = {
     "membrane-protrusion": ("height $d$ ($R_{b}$)", "growth speed ($R_{b}/\\tau$)"),
     "ring-slipping": ("ring position $u_m$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
-    "polar-swimmer": ("ring position $u_m$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
+    "polar-swimmer": ("polarity $P$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
     "guided-division": ("neck radius $r_n$ ($R_{0}$)",),
 }
 
@@ -284,3 +284,17 @@ def test_regulator_colours_fall_evenly_in_lightness() -> None:
     steps = -np.diff(lightness)
     assert np.all(steps > 0)
     assert steps.max() < 2.5 * steps.mean()
+
+
+def test_growth_that_starts_like_a_power_of_time_is_logarithmic():
+    """As that of a flat disc, which buckles as the root of time: on a linear axis only its start would be seen."""
+    slow = dataset_of("membrane-protrusion")
+    fast = slow.assign_coords(time=slow["time"] ** 4 / 8.0)
+    speed = slow["normal_velocity"] / np.maximum(fast["time"], 1e-9).values[:, None] ** 0.5
+    fast["normal_velocity"] = (("time", "point"), speed.values, slow["normal_velocity"].attrs)
+    for dataset, scale in ((slow, "linear"), (fast, "log")):
+        figure = plot_run(dataset)
+        right = next(axes for axes in figure.axes if axes.get_ylabel().startswith("growth speed"))
+        assert right.get_yscale() == scale
+        assert right.get_ylim()[1] > dataset["normal_velocity"][:, 0].max()
+        figure.canvas.draw()

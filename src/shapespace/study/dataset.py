@@ -23,9 +23,10 @@ POINTS = 241
 CONVENTIONS = (
     "u = 0 upper pole or apex, u = 1 lower pole or rim; r' = h cos psi, z' = -h sin psi; outward normal "
     "(sin psi, cos psi); curvatures positive on a sphere; velocities in the lab frame; at the initial time, whose state is "
-    "given and not solved for, flow, pressure, local tension and powers are those of the first step"
+    "given and not solved for, flow, pressure and powers are those of the first step; a flat disc, whose flow has no limit "
+    "there, is at rest"
 )
-_FLOW_FIELDS = ("tangential_velocity", "normal_velocity", "local_tension")
+_FLOW_FIELDS = ("tangential_velocity", "normal_velocity")
 _FLOW_OBSERVABLES = ("velocity", "pressure", "dissipation", "chemical_power", "external_power")
 
 
@@ -36,8 +37,8 @@ def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome |
     times = np.array([frame.time for frame in frames])
     fields = [_fields(engine, frame) for frame in frames]
     series = [frame.observables for frame in frames]
-    if frames[0].step == 0.0:
-        fields[0], series[0] = _set_in_motion(fields, series, scenario.model == "open-membrane")
+    if frames[0].step == 0.0 and scenario.model == "closed-surface":
+        fields[0], series[0] = _set_in_motion(fields, series)
     if "velocity" in series[-1]:
         travelled = _travelled(times, np.array([values.get("velocity", 0.0) for values in series]))
         travelled = travelled / scales.factor("length")
@@ -74,25 +75,20 @@ def open_dataset(path: str | Path) -> xr.Dataset:
 
 
 def _set_in_motion(
-    fields: list[dict[str, Array]], series: list[dict[str, float]], is_open: bool
+    fields: list[dict[str, Array]], series: list[dict[str, float]]
 ) -> tuple[dict[str, Array], dict[str, float]]:
-    """Fields and observables of the initial frame with what the force balance gives: to the length of the first step,
+    """Fields and observables of the initial frame with what its force balance gives: to the length of the first step,
     the values after it. Where no step was taken they are not known, NaN and absent.
     """
-    field, values = dict(fields[0]), dict(series[0])
-    observables = (*_FLOW_OBSERVABLES, *(["tension_pole"] if is_open else []))  # elsewhere it follows from c
-    after = fields[1] if len(fields) > 1 else None
-    for name in _FLOW_FIELDS:
-        if name in field:
-            u = field["mesh_coordinate"]
-            field[name] = (
-                np.full_like(u, np.nan) if after is None else np.interp(u, after["mesh_coordinate"], after[name])
-            )
-    for name in observables:
-        values.pop(name, None)
-        if after is not None and name in series[1]:
-            values[name] = series[1][name]
-    return field, values
+    later, after = fields[1:2], series[1:2]
+    u = fields[0]["mesh_coordinate"]
+    flow = {
+        name: np.interp(u, later[0]["mesh_coordinate"], later[0][name]) if later else np.full_like(u, np.nan)
+        for name in _FLOW_FIELDS
+    }
+    given = {name: value for name, value in series[0].items() if name not in _FLOW_OBSERVABLES}
+    solved = {name: after[0][name] for name in _FLOW_OBSERVABLES if after and name in after[0]}
+    return fields[0] | flow, given | solved
 
 
 def _travelled(times: Array, speeds: Array) -> Array:

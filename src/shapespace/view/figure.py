@@ -48,7 +48,7 @@ class Layout:
 _LAYOUTS = {
     "membrane-protrusion": Layout("height", twin=panels.GROWTH),
     "ring-slipping": Layout("ring_position", twin="velocity", with_swim=True),
-    "polar-swimmer": Layout("velocity", twin="ring_position", with_swim=True),
+    "polar-swimmer": Layout("velocity", twin="polarity", with_swim=True),
     "guided-division": Layout("equator_radius", words="neck radius", with_inset=True),
 }
 _GENERIC_CURVES = ("equator_radius", "height", "neck_radius", "ring_position", "length", "area", "velocity")

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FixedLocator, MaxNLocator
+from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
 
 from shapespace.view import style
 from shapespace.view.frames import Array, Profile, Run, observable, progress_measure
@@ -14,6 +14,7 @@ GROWTH = "growth speed"  # not an observable: the normal velocity of the apex
 _OWN_SCALE_FACTOR = {"velocity": 10.0, "curvature": 4.0}  # between the ranges of a row: more, and each has its own
 _EARLY = 0.03  # part of the run's time
 _REST = 0.01  # velocities below this part of the row's largest are rest: not magnified
+_LEAST_GROWTH = 1e-5  # part of the largest growth speed at which its logarithmic axis ends
 _INSET_FACTOR = 8.0  # a peak this much above its surroundings is shown enlarged
 
 VELOCITIES = (("tangential_velocity", style.RED, "-"), ("normal_velocity", style.BLUE, (0, (4, 1.2))))
@@ -33,7 +34,7 @@ def draw_curve(axes: Axes, run: Run, name: str, words: str, twin: str | None, ma
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
     _number_dots(axes, run.time, values, marked, colour)
     if twin is not None:
-        _draw_twin(axes, run, twin)
+        _draw_twin(axes, run, twin, early_time(run, values))
 
 
 def colour_of(name: str) -> str:
@@ -98,8 +99,8 @@ def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int], 
         label.set_path_effects([withStroke(linewidth=2, foreground="white")])
 
 
-def _draw_twin(axes: Axes, run: Run, twin: str) -> None:
-    """A second series on the right axis."""
+def _draw_twin(axes: Axes, run: Run, twin: str, early: float) -> None:
+    """A second series on the right axis; growth is logarithmic where time is, as it starts like a power of time."""
     right = axes.twinx()
     right.spines["right"].set_visible(True)
     if twin == GROWTH:
@@ -113,7 +114,12 @@ def _draw_twin(axes: Axes, run: Run, twin: str) -> None:
     right.set_ylabel(text, color=colour)
     right.tick_params(axis="y", labelcolor=colour)
     right.margins(y=0.12)
-    right.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+    if twin == GROWTH and early > 0 and values.max() == np.abs(values).max() > 0:
+        right.set_yscale("log", nonpositive="mask")
+        right.set_ylim(_LEAST_GROWTH * values.max(), 2.0 * values.max())
+        right.yaxis.set_minor_locator(NullLocator())
+    else:
+        right.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
     axes.set_zorder(right.get_zorder() + 1)
     axes.patch.set_visible(False)
 
