@@ -10,7 +10,6 @@ from shapespace.analysis.bifurcation import (
     branch_directions,
     locate_branch_point,
     locate_fold,
-    null_vector,
 )
 from shapespace.analysis.singular import SingularProblem
 from shapespace.base.arrays import Array
@@ -33,7 +32,9 @@ def solved(problem: CollocationProblem, p: Array) -> Array:
 def bratu_fold(elements: int, degree: int) -> SingularPoint:
     problem, p = bratu(elements, degree), np.array([3.4])
     x = solved(problem, p)
-    point = locate_fold(problem, 0, x, p, null_vector(problem, x, p, np.zeros_like(x)))
+    _, linearisation = problem.linearise(x, p, Rate.of_growth(problem.stored(x, p)))
+    mode = linearisation.solve(problem.derivative(x, p, np.zeros_like(x), np.ones(1)))
+    point = locate_fold(problem, 0, x, p, mode)
     assert isinstance(point, SingularPoint)
     return point
 
@@ -120,6 +121,7 @@ def test_no_singular_point_is_an_outcome():
     """From a state far from any singular point of a linear problem there is nothing to find."""
     problem = chafee_infante(10)
     x = at_rest(problem)
-    point = locate_fold(problem, 0, x, np.array([0.5]), null_vector(problem, x, np.array([0.5]), np.zeros_like(x)))
+    mode = np.random.default_rng(0).standard_normal(len(x))
+    point = locate_fold(problem, 0, x, np.array([0.5]), mode)
     assert isinstance(point, Outcome)
     assert not point.is_success

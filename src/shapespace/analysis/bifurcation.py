@@ -8,7 +8,7 @@ import numpy as np
 from shapespace.analysis.singular import SingularProblem, probe
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractProblem, AbstractSmoothProblem, Rate
+from shapespace.base.problem import AbstractProblem, AbstractSmoothProblem, Border, Rate
 from shapespace.numerics.newton import Newton, solve_root
 
 LOCATION = Newton(tolerance=1e-10, max_iterations=30)
@@ -74,10 +74,8 @@ def locate_fold(
 def locate_branch_point(
     problem: AbstractSmoothProblem, index: int, x: Array, p: Array, tangent: Array
 ) -> SingularPoint | Outcome:
-    """The branch point near (x, p), where one branch has the tangent (dx, dparameter) (n + 1,)."""
-    null = null_vector(problem, x, p, tangent[:-1])
-    kernel = np.stack([tangent, np.append(null, 0.0)])
-    start = SingularProblem(problem, index, kernel)
+    """The branch point near (x, p), where one branch has the unit tangent (dx, dparameter) (n + 1,)."""
+    start = SingularProblem(problem, index, np.stack([tangent, second_direction(problem, index, x, p, tangent)]))
     root = solve_root(start, np.append(x, [p[index], 0.0]), p, _rest(problem, x, p), LOCATION)
     if root.outcome is not Outcome.CONVERGED:
         return root.outcome
@@ -94,18 +92,20 @@ def locate_branch_point(
     return SingularPoint(kind, problem, index, final.state(root.x), at, error, final.kernel, directions)
 
 
-def null_vector(problem: AbstractSmoothProblem, x: Array, p: Array, away_from: Array) -> Array:
-    """The unit vector (n,) orthogonal to `away_from` (n,) that J near (x, p) shrinks most, in the problem's inner product.
+def second_direction(problem: AbstractSmoothProblem, index: int, x: Array, p: Array, tangent: Array) -> Array:
+    """The unit vector (n + 1,) orthogonal to a tangent that [F_x F_p] near a branch point shrinks most.
 
-    The inverse of a nearly singular J sends any vector almost into the null direction: what several such images share
-    is their leading singular vector.
+    The inverse of a nearly singular matrix sends any vector almost into its null direction: what several such images
+    share is their leading singular vector.
     """
-    weights = problem.weights(x)
-    _, linearisation = problem.linearise(x, p, _rest(problem, x, p))
-    images = np.stack([linearisation.solve(probe(len(x), number)) for number in range(PROBES)])
-    square = weights @ away_from**2
-    if square > 0.0:
-        images = images - np.outer(images @ (weights * away_from) / square, away_from)
+    weights = np.append(problem.weights(x), max(abs(p[index]), 1.0) ** -2)
+    unit = np.zeros_like(p)
+    unit[index] = 1.0
+    slope = problem.derivative(x, p, np.zeros_like(x), unit)
+    row = weights * tangent
+    border = Border(slope[None], row[None, :-1], np.array([[row[-1]]]))
+    _, linearisation = problem.linearise(x, p, _rest(problem, x, p), border)
+    images = np.stack([linearisation.solve(np.append(probe(len(x), number), 0.0)) for number in range(PROBES)])
     images = images / np.sqrt(images**2 @ weights)[:, None]
     _, _, shared = np.linalg.svd(images * np.sqrt(weights), full_matrices=False)
     combination = images @ (np.sqrt(weights) * shared[0])

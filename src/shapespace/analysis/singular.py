@@ -149,7 +149,7 @@ class SingularProblem(AbstractContinuableProblem):
         return self.base.stored_norm(dq, q)
 
     def with_kernel(self, x: Array, p: Array) -> "SingularProblem":
-        """The same problem with the kernel found at X as an orthonormal basis, the last vector kept in its direction."""
+        """The same problem with the kernel found at X as an orthonormal basis."""
         vectors = self._kernel(x, p, Rate.of_growth(self.stored(x, p))).vectors
         weights = self.weights(x)[: vectors.shape[1]]
         basis: list[Array] = []
