@@ -1,0 +1,278 @@
+"""Pseudo-arclength continuation of F(x; p) = 0 at rest in one parameter, with controlled steps and exact stops."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial.polynomial import polyval
+
+from shapespace.analysis.branch import Point, direction_at, hermite, metric, orthogonal_plane, real_roots, sign_on
+from shapespace.analysis.extended import AbstractMeasure, ExtendedProblem, Given, Parameter
+from shapespace.analysis.stationary import STEP_NEWTON
+from shapespace.base.arrays import Array
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import AbstractContinuableProblem, Rate
+from shapespace.numerics.newton import Newton, solve_root
+
+MEMORY = 4
+"""Points that decide how a branch goes on: the last, and an earlier one at a distance fit for extrapolation."""
+AT_VALUE = 1e-9
+"""A measure within this of a value, relative to it (or one), is there."""
+WORST_MISS = 20.0
+"""How many times the wanted error of prediction a corrector may move a point: farther away may lie another branch."""
+
+
+@dataclass(frozen=True)
+class Arclength:
+    """Options of steps along a branch, in its mesh-independent `metric`.
+
+    first, smallest, largest: step lengths. prediction: wanted distance of the corrector, in the problem's norm. turn: largest
+    angle between tangents of neighbours [rad]. crossing: largest step through a branch point, which tells a crossing of
+    branches from two that pass each other at a distance not much smaller. parameter_scale: change of the parameter that
+    counts as one; 0 stands for max(|parameter|, 1).
+    """
+
+    first: float = 0.01
+    smallest: float = 1e-7
+    largest: float = 0.2
+    prediction: float = 3e-3
+    turn: float = 0.4
+    crossing: float = 5e-3
+    parameter_scale: float = 0.0
+    max_points: int = 1000
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.smallest <= self.first <= self.largest:
+            raise ValueError(
+                f"steps must satisfy 0 < smallest <= first <= largest; got {self.smallest}, {self.first}, {self.largest}."
+            )
+        if not 0.0 < self.turn < 0.5 * np.pi:
+            raise ValueError(f"turn must lie in (0, pi/2); got {self.turn}.")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """A value of a measure at which a branch has an exact point with this label, and where it ends if `ends`."""
+
+    measure: AbstractMeasure
+    value: float
+    label: str = "user"
+    ends: bool = False
+
+
+Event = Callable[[Point], Outcome | None]
+"""Looks at an accepted point; an outcome ends the branch there."""
+
+
+def start_point(
+    problem: AbstractContinuableProblem,
+    x: Array,
+    p: Array,
+    index: int,
+    direction: float = 1.0,
+    options: Arclength = Arclength(),
+    tangent: Array | None = None,
+) -> Point | Outcome:
+    """The first point of a branch at a solution x, from which the parameter rises (direction 1) or falls (-1).
+
+    tangent (n + 1,): where several branches meet, that of the one to follow. Without it they must not meet: SINGULAR.
+    """
+    point = Point(problem, x, p, index, np.append(np.zeros_like(x), 1.0), step=options.first, label="start")
+    weights, X = metric(problem, point.joined, options.parameter_scale), point.joined
+    rate = Rate.of_growth(problem.stored(x, p))
+    # At a fold no plane of constant parameter will do, but almost any other.
+    generic = np.random.default_rng(0).standard_normal(len(X))
+    for guess in (point.tangent, generic) if tangent is None else (tangent,):
+        plane = orthogonal_plane(point, weights * guess, X)
+        found = direction_at(plane, X, p, rate)
+        if found is not None:
+            unit = found.tangent / np.sqrt(weights @ found.tangent**2)
+            turned = tangent is None and unit[-1] * direction < 0.0
+            unit = -unit if turned else unit
+            again = direction_at(orthogonal_plane(point, weights * unit, X), X, p, rate)
+            return replace(point, tangent=unit, sign=float("nan") if again is None else again.sign)
+    if tangent is None:
+        return Outcome.SINGULAR
+    return replace(point, tangent=tangent / np.sqrt(weights @ tangent**2))
+
+
+@dataclass
+class Continuation:
+    """Iterate to get the points of a branch one after another; then `outcome` says why they ended.
+
+    past: the start, or the last MEMORY points of an earlier continuation (oldest first), to go on as if never interrupted.
+    Each point is converged on its own discretisation; the next one is computed on the one that the problem asks for there.
+    """
+
+    past: Sequence[Point]
+    stops: Sequence[Stop] = ()
+    options: Arclength = Arclength()
+    newton: Newton = STEP_NEWTON
+    events: Sequence[Event] = ()
+    outcome: Outcome | None = None
+
+    def __iter__(self) -> Iterator[Point]:
+        """New points, not including those of the past."""
+        past = list(self.past)[-MEMORY:]
+        for _ in range(self.options.max_points):
+            accepted = self._advance(past)
+            if accepted is None:
+                self.outcome = Outcome.BRANCH_STALLED
+                return
+            past = [*past, accepted][-MEMORY:]
+            yield accepted
+            self.outcome = self._ending(accepted)
+            if self.outcome is not None:
+                return
+        self.outcome = Outcome.MAX_STEPS
+
+    def _ending(self, point: Point) -> Outcome | None:
+        """Why to end at this point, if anything says so."""
+        for event in self.events:
+            if (outcome := event(point)) is not None:
+                return outcome
+        if any(stop.ends and stop.label == point.label and _is_at(stop, point) for stop in self.stops):
+            return Outcome.REACHED_STOP
+        return None
+
+    def _advance(self, past: Sequence[Point]) -> Point | None:
+        """Try steps until one is accepted; None where they become too small."""
+        problem = past[-1].problem.adapted(past[-1].x)
+        assert isinstance(problem, AbstractContinuableProblem)
+        places = [point.on(problem) for point in past]
+        places[-1] = replace(places[-1], sign=sign_on(places[-1], problem))
+        trial = _Trial(places, self.options, self.newton)
+        step = past[-1].step
+        while step >= self.options.smallest:
+            accepted = trial.step(step)
+            if accepted is not None:
+                accepted = self._stopped(trial, accepted)
+            if accepted is not None:
+                return accepted
+            step *= 0.5
+        return None
+
+    def _stopped(self, trial: "_Trial", end: Point) -> Point | None:
+        """The end of a step, or the first stop on the way to it; None where there is one that Newton does not find."""
+        crossings = [(s, stop) for stop in self.stops if (s := _crossing(stop, trial.now, end)) is not None]
+        return trial.stop(end, *min(crossings, key=lambda crossing: crossing[0])) if crossings else end
+
+
+class _Trial:
+    """Steps from one point on one discretisation, of any length."""
+
+    def __init__(self, places: Sequence[Point], options: Arclength, newton: Newton) -> None:
+        self.places, self.now, self.options, self.newton = places, places[-1], options, newton
+        self.X = self.now.joined
+        self.metric = metric(self.now.problem, self.X, options.parameter_scale)
+        self.row = self.metric * self.now.tangent
+        self.rate = Rate.of_growth(self.now.problem.stored(self.now.x, self.now.p))
+
+    def predicted(self, step: float) -> tuple[Array, int]:
+        """X ahead, and the order of its error: by the cubic through an earlier point, or by the tangent."""
+        now = self.now
+        for earlier in self.places[-2::-1]:
+            length = now.arclength - earlier.arclength
+            if length >= 0.2 * step:
+                cubic = hermite(earlier.joined, earlier.tangent, self.X, now.tangent, length)
+                return np.asarray(polyval(length + step, cubic)), 4
+        return self.X + step * now.tangent, 2
+
+    def step(self, step: float) -> Point | None:
+        """The point ahead; None where Newton fails or may have left the branch, or where too much lies between."""
+        options = self.options
+        guess, order = self.predicted(step)
+        plane = orthogonal_plane(self.now, self.row, guess)
+        root = solve_root(plane, guess, self.now.p, self.rate, self.newton)
+        if root.outcome is not Outcome.CONVERGED:
+            return None
+        error = plane.norm(root.x - guess, root.x) / options.prediction
+        if error > WORST_MISS:
+            return None
+        found = direction_at(plane, root.x, self.now.p, self.rate, root.linearisation)
+        if found is None:
+            return None
+        point = self._point(plane, root.x, found.tangent, found.sign)
+        lengths = np.sqrt((self.row @ self.now.tangent) * (self.metric @ point.tangent**2))
+        turn = float(np.arccos(np.minimum(self.row @ point.tangent / lengths, 1.0))) / options.turn
+        if not turn <= 1.0 or _hides_folds(self.now, point):
+            return None
+        if step > options.crossing and self.now.sign * point.sign < 0.0:
+            return None
+        factor = min(2.0, 0.9 * max(error, 1e-12) ** (-1.0 / order), 0.5 / max(turn, 1e-12))
+        if root.jacobians > 2:
+            factor = min(factor, 0.7)
+        following = min(max(factor, 0.2) * step, options.largest)
+        return replace(point, step=following, iterations=root.iterations, jacobians=root.jacobians)
+
+    def stop(self, end: Point, s: float, stop: Stop) -> Point | None:
+        """The exact point of a stop near arclength s on the way to an end; None where Newton fails or ends far off."""
+        now = self.now
+        cubic = hermite(self.X, now.tangent, end.joined, end.tangent, end.arclength - now.arclength)
+        guess = np.asarray(polyval(s, cubic))
+        fixed = ExtendedProblem(now.problem, (now.index,), (Given(stop.measure, stop.value),))
+        root = solve_root(fixed, guess, now.p, self.rate, self.newton)
+        if root.outcome is not Outcome.CONVERGED:
+            return None
+        X = root.x
+        if fixed.norm(X - guess, X) > WORST_MISS * self.options.prediction:
+            return None
+        if stop.measure == Parameter(now.index):
+            X[-1] = stop.value
+        plane = orthogonal_plane(now, self.row, X)
+        found = direction_at(plane, X, now.p, self.rate)
+        if found is None:
+            return None
+        point = self._point(plane, X, found.tangent, found.sign)
+        return replace(point, step=end.step, iterations=root.iterations, jacobians=root.jacobians, label=stop.label)
+
+    def _point(self, plane: ExtendedProblem, X: Array, tangent: Array, sign: float) -> Point:
+        """A point at X, its arclength by the chord in the metrics of both of its ends."""
+        x, p = plane.split(X, self.now.p)
+        there = metric(self.now.problem, X, self.options.parameter_scale)
+        chord = (X - self.X) ** 2
+        length = 0.5 * (np.sqrt(self.metric @ chord) + np.sqrt(there @ chord))
+        unit = tangent / np.sqrt(there @ tangent**2)
+        return Point(self.now.problem, x, p, self.now.index, unit, self.now.arclength + float(length), sign=sign)
+
+
+def _hides_folds(start: Point, end: Point) -> bool:
+    """Whether the parameter, as a cubic in arclength, turns twice between two points, by more than errors explain."""
+    length = end.arclength - start.arclength
+    # With t from -1 to 1, twice its derivative is a + b t + c t^2.
+    first, last = float(start.tangent[-1]) * length, float(end.tangent[-1]) * length
+    rise = end.parameter - start.parameter
+    b, c = 0.5 * (last - first), 0.75 * (first + last - 2.0 * rise)
+    a = 0.5 * (first + last) - c
+    root = b * b - 4.0 * a * c
+    if root <= 0.0 or abs(b) >= 2.0 * abs(c) or (a + c) * c <= abs(b * c):
+        return False
+    # Between its two turns the cubic changes by |c| (t2 - t1)^3/6, and dt = 2 ds/length.
+    return root**1.5 / (12.0 * c * c) > AT_VALUE * max(abs(start.parameter), 1.0)
+
+
+def _course(measure: AbstractMeasure, start: Point, end: Point) -> Array:
+    """The measure from start to end as a cubic (4,) in arclength from the start."""
+    ends = []
+    for point in (start, end):
+        row, parameters = measure.gradient(point.problem, point.x, point.p)
+        slope = row @ point.tangent[:-1] + parameters[point.index] * point.tangent[-1]
+        ends += [np.array(measure.value(point.problem, point.x, point.p)), np.array(slope)]
+    return hermite(ends[0], ends[1], ends[2], ends[3], end.arclength - start.arclength)
+
+
+def _crossing(stop: Stop, start: Point, end: Point) -> float | None:
+    """Arclength from the start to where a measure first takes the stop's value, at most that of the end; None if never."""
+    length = end.arclength - start.arclength
+    if _is_at(stop, end):
+        return length
+    cubic = _course(stop.measure, start, end)
+    cubic[0] -= stop.value
+    # A start at the value is no crossing, though round-off puts a root just ahead of it.
+    roots = real_roots(cubic, 1e-3 * length if _is_at(stop, start) else 0.0, length)
+    return float(roots[0]) if len(roots) else None
+
+
+def _is_at(stop: Stop, point: Point) -> bool:
+    value = stop.measure.value(point.problem, point.x, point.p)
+    return abs(value - stop.value) <= AT_VALUE * max(abs(stop.value), 1.0)
