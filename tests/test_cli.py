@@ -59,6 +59,10 @@ def shell(
     return Shell(capsys)
 
 
+def no_space(_: int) -> None:
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
 def one_complaint(answer: Answer, status: int = 2) -> str:
     """The only line on stderr of a command that failed; nothing may be on stdout."""
     assert answer.status == status, answer
@@ -331,6 +335,9 @@ def test_pictures_and_export_go_where_they_are_wanted(shell: Shell, monkeypatch:
     assert "cannot be read or written" in one_complaint(shell("plot", "run", "--out", "no/a.png"))
     assert shell("movie", "run").out == "run/movie.mp4\n"
     assert shell("export", "run", "run.nc") == (0, "run.nc\n", "")
+    with monkeypatch.context() as patch:
+        patch.setattr(files.os, "fsync", no_space)
+        assert "the disk is full" in one_complaint(shell("export", "run", "more.nc"))
     xr.testing.assert_identical(xr.load_dataset("run.nc"), dataset)
     assert sorted(file.name for file in Path().iterdir()) == ["a.pdf", "run", "run.nc"]
 

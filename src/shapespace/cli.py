@@ -195,13 +195,14 @@ def export(
 ) -> None:
     """Write a stored run as one self-describing NetCDF file, readable by xarray, Python, Julia, MATLAB."""
     from shapespace.study.dataset import open_dataset
-    from shapespace.study.files import replacing
+    from shapespace.study.files import storage, write_atomically
 
     if file.suffix != ".nc":
         raise InputError(f"{file}: is not named as a NetCDF file; end it in .nc.")
-    dataset = open_dataset(store)
-    with replacing(file) as partial:
-        dataset.to_netcdf(partial, engine="h5netcdf")
+    # Made in memory: HDF5 crashes the process at its end when a disk is full under an open file.
+    data = open_dataset(store).to_netcdf(engine="h5netcdf")
+    with storage(file):
+        write_atomically(file, bytes(data))
     print(file)
 
 
