@@ -49,6 +49,10 @@ class Point:
         """(x, p[index]) (n + 1,)."""
         return np.append(self.x, self.p[self.index])
 
+    def reversed(self) -> "Point":
+        """The same point on the way back."""
+        return replace(self, tangent=-self.tangent, sign=-self.sign)
+
     def on(self, problem: AbstractContinuableProblem) -> "Point":
         """The same point on another discretisation, as exact as interpolation leaves it."""
         if problem is self.problem:

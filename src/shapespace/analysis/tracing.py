@@ -1,0 +1,123 @@
+"""A branch with its singular points: located between the points that bracket them, named, and ways onto other branches."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
+
+from shapespace.analysis.bifurcation import Kind, SingularPoint, locate_branch_point, locate_fold
+from shapespace.analysis.branch import Bracket, Point, brackets, hermite, metric, real_roots
+from shapespace.analysis.continuation import Continuation
+from shapespace.base.arrays import Array
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import AbstractSmoothProblem
+
+SAME_PLACE = 1e-6
+"""A fold and a branch point whose parameters differ by less than this, relative to it (or one), are one pitchfork."""
+
+
+@dataclass(frozen=True)
+class Located:
+    """A singular point on the way from one point to the next."""
+
+    point: SingularPoint
+    bracket: Bracket
+
+
+@dataclass(frozen=True)
+class Missed:
+    """A bracket in which no singular point was found, and why: said, not hidden."""
+
+    bracket: Bracket
+    outcome: Outcome
+
+
+def traced(branch: Continuation) -> Iterator[Point | Located | Missed]:
+    """The points of a branch, each after the singular points that lie before it."""
+    last = branch.past[-1]
+    for point in branch:
+        yield from singular_points(last, point)
+        yield point
+        last = point
+
+
+def singular_points(before: Point, after: Point) -> list[Located | Missed]:
+    """What lies between two neighbours. A pitchfork met from its side branch turns the parameter too: one point, not two."""
+    found: list[Located | Missed] = []
+    for bracket in sorted(brackets(before, after), key=lambda bracket: bracket.kind):
+        if bracket.kind == "fold" and any(isinstance(one, Located) and _turns(one.point) for one in found):
+            continue
+        located = _located(bracket)
+        found.append(_or_pitchfork(located) if isinstance(located, Located) and bracket.kind == "fold" else located)
+    return found
+
+
+def _turns(point: SingularPoint) -> bool:
+    """Whether the parameter turns on one of the branches through a point."""
+    return point.kind is Kind.PITCHFORK
+
+
+def _same_place(one: SingularPoint, other: SingularPoint) -> bool:
+    return abs(one.parameter - other.parameter) <= SAME_PLACE * max(abs(one.parameter), 1.0)
+
+
+def _located(bracket: Bracket) -> Located | Missed:
+    """Locate the singular point of a bracket, on the discretisation of its end."""
+    problem = bracket.after.problem
+    assert isinstance(problem, AbstractSmoothProblem)
+    X, tangent = between(bracket)
+    p = bracket.after.p.copy()
+    p[bracket.after.index] = X[-1]
+    locate = locate_fold if bracket.kind == "fold" else locate_branch_point
+    point = locate(problem, bracket.after.index, X[:-1], p, tangent[:-1] if bracket.kind == "fold" else tangent)
+    if isinstance(point, Outcome):
+        return Missed(bracket, point)
+    return Located(point, bracket) if _is_inside(bracket, point) else Missed(bracket, Outcome.DIVERGED)
+
+
+def _is_inside(bracket: Bracket, point: SingularPoint) -> bool:
+    """Whether a located point lies no farther from either end than they from each other, but for the arc between."""
+    problem = point.problem
+    there = np.append(point.x, point.parameter)
+    weights = metric(problem, there)
+    ends = [bracket.before.on(problem).joined, bracket.after.joined]
+    distance = max(float(np.sqrt(weights @ (there - end) ** 2)) for end in ends)
+    return distance <= 1.5 * (bracket.after.arclength - bracket.before.arclength)
+
+
+def _or_pitchfork(fold: Located) -> Located:
+    """A turn of the parameter where a second branch passes is a pitchfork: there F_p lies in the range of F_x as well."""
+    point = fold.point
+    kernel = np.append(point.kernel[0], 0.0)
+    other = locate_branch_point(point.problem, point.index, point.x, point.p, kernel)
+    is_same = isinstance(other, SingularPoint) and _same_place(point, other) and _is_near(point, other)
+    return Located(other, fold.bracket) if is_same and isinstance(other, SingularPoint) else fold
+
+
+def _is_near(one: SingularPoint, other: SingularPoint) -> bool:
+    return one.problem.norm(other.x - one.x, one.x) <= np.sqrt(SAME_PLACE)
+
+
+def between(bracket: Bracket) -> tuple[Array, Array]:
+    """(x, parameter) and the unit tangent (n + 1,) in a bracket: where the parameter turns, or half way."""
+    problem = bracket.after.problem
+    start, end = bracket.before.on(problem), bracket.after
+    length = end.arclength - start.arclength
+    cubic = hermite(start.joined, start.tangent, end.joined, end.tangent, length)
+    s = 0.5 * length
+    if bracket.kind == "fold":
+        turns = real_roots(polyder(cubic[:, -1]), 0.0, length)
+        s = float(turns[0]) if len(turns) else s
+    X, tangent = polyval(s, cubic), polyval(s, polyder(cubic))
+    weights = metric(problem, X)
+    return X, tangent / np.sqrt(weights @ tangent**2)
+
+
+def side_branches(point: SingularPoint, along: Array, step: float) -> list[Point]:
+    """Starts of the other branch through a branch point, to both sides; `along` (n + 1,) is the branch already known."""
+    weights = metric(point.problem, np.append(point.x, point.parameter))
+    overlaps = [abs(weights @ (direction * along)) for direction in point.directions]
+    other = point.directions[int(np.argmin(overlaps))]
+    start = Point(point.problem, point.x, point.p, point.index, other, step=step, label=str(point.kind))
+    return [start, replace(start, tangent=-other)]
