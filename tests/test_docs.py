@@ -1,0 +1,115 @@
+"""What README and docs show works: Python blocks run, shell lines are commands and targets that there are."""
+
+import json
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+
+import shapespace as ss
+from shapespace.cli import app
+from shapespace.study.scenario import load_scenario, template
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")), ROOT / "benchmarks" / "README.md"]
+SHORT = {"until": 2e-3, "elements": 20}
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
+
+
+def run_blocks(page: Path, names: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The Python blocks of a page, one after the other as in one session."""
+    names = {"__name__": "docs", **(names or {})}
+    for number, text in enumerate(blocks(page, "python"), start=1):
+        exec(compile(text, f"{page.name}, block {number}", "exec"), names)
+    return names
+
+
+@pytest.fixture
+def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """An empty folder, pictures that need no screen, and scenarios that end soon."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(ss, "scenario", lambda name, **keys: _built_in(name, **{**SHORT, **keys}), raising=False)
+    mpl.use("agg")
+
+
+_built_in = ss.scenario
+
+
+@pytest.mark.usefixtures("short")
+def test_readme_python_runs():
+    names = run_blocks(ROOT / "README.md")
+    assert names["run"].outcome == "reached-end"
+    assert Path("results/my-division/store.json").exists()
+    assert names["data"].sizes["time"] > 2
+
+
+@pytest.mark.usefixtures("short")
+def test_a_store_is_read_without_the_package():
+    run = ss.run(ss.scenario("guided-division"), out="results/guided-division")
+    page = ROOT / "docs" / "file-format.md"
+    Path("read.py").write_text(blocks(page, "python")[0])
+    code = "import runpy, sys; runpy.run_path('read.py'); assert 'shapespace' not in sys.modules"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[:2] == ["guided-division", "reached-end"]
+    assert float(done.stdout.split()[-1]) == pytest.approx(run.observables["height"])
+    entries = [*json.loads(Path("results/guided-division/store.json").read_text())]
+    with np.load("results/guided-division/frames/000001.npz") as frame:
+        entries += [*frame]
+    assert [name for name in entries if f"`{name}`" not in page.read_text(encoding="utf-8")] == []
+
+
+def test_a_term_can_be_added_as_the_page_says():
+    run_blocks(ROOT / "docs" / "how-to" / "add-a-term.md")
+
+
+def test_every_python_block_is_run():
+    run = {"README.md", "file-format.md", "add-a-term.md"}
+    assert {page.name for page in PAGES if blocks(page, "python")} == run
+
+
+def shell_lines() -> list[tuple[str, str]]:
+    """(page, command) of every line in a shell block, comments removed."""
+    return [
+        (page.name, " ".join(words))
+        for page in PAGES
+        for block in blocks(page, "sh")
+        for line in block.splitlines()
+        if (words := shlex.split(line, comments=True))
+    ]
+
+
+@pytest.mark.parametrize(("page", "command"), shell_lines())
+def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_path: Path, monkeypatch: Any):
+    monkeypatch.chdir(tmp_path)
+    program, *arguments = command.split()
+    if program == "make":
+        assert shutil.which("make")
+        targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)
+        assert {word for word in arguments if "=" not in word} <= {*targets}
+        return
+    assert program == "shapespace", f"{page}: {command}"
+    function, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
+    assert function.__name__ in {"list_scenarios", "config", "run_command", "plot", "movie", "export", "check"}
+    if function.__name__ == "run_command":
+        name, changes = bound.args[0], dict(text.split("=") for text in bound.kwargs.get("settings", ()))
+        if name.endswith(".toml"):
+            Path(name).write_text(template("guided-division"))
+            load_scenario(name).with_overrides(changes)
+        else:
+            _built_in(name, **changes)
+
+
+def test_links_lead_somewhere():
+    for page in PAGES:
+        for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+            assert target.startswith("http") or (page.parent / target).exists(), f"{page.name}: {target}"
