@@ -19,6 +19,7 @@ class Outcome(StrEnum):
     REACHED_STOP = "reached-stop"
     NOT_REACHED = "not-reached"
     BRANCH_STALLED = "branch-stalled"
+    EIGENVALUES_UNCONVERGED = "eigenvalues-unconverged"
 
     @property
     def is_success(self) -> bool:
@@ -59,4 +60,7 @@ _ADVICE = {
         "The step along the branch fell below its minimum: the branch may end here; if not, refine the mesh or loosen tolerances."
     ),
     Outcome.MAX_STEPS: "The step limit was reached: raise `max_steps` or resume.",
+    Outcome.EIGENVALUES_UNCONVERGED: (
+        "The leading growth rates did not converge or contradict each other: raise `elements`, or ask for fewer."
+    ),
 }

@@ -9,6 +9,9 @@ from shapespace.base.arrays import Array
 from shapespace.numerics.gauss import GaussRule, gauss_rule
 from shapespace.numerics.system import Symmetry
 
+MESH_ROUND_OFF = 1e-15
+"""Meshes on [0, 1] that differ by no more are the same."""
+
 
 @dataclass(frozen=True)
 class State:
@@ -81,7 +84,10 @@ class State:
         scalars = np.array(symmetry.scalars) * self.scalars
         if not symmetry.flips:
             return State(self.mesh, nodes, slopes, algebraic, scalars)
-        return State(1.0 - self.mesh[::-1], nodes[::-1], -slopes[::-1, ::-1], algebraic[::-1, ::-1], scalars)
+        mesh = 1.0 - self.mesh[::-1]
+        if np.abs(mesh - self.mesh).max() <= MESH_ROUND_OFF:
+            mesh = self.mesh
+        return State(mesh, nodes[::-1], -slopes[::-1, ::-1], algebraic[::-1, ::-1], scalars)
 
 
 def state_from_functions(

@@ -1,5 +1,6 @@
 """The first-order system of an axisymmetric fluid surface, assembled from terms, species, ends and constraints."""
 
+import math
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any
@@ -10,7 +11,7 @@ import jax.numpy as jnp
 from shapespace.base.arrays import Traced
 from shapespace.geometry.curve import Geometry, area_element, tangent_slopes, volume_element
 from shapespace.geometry.motion import Rates, divergence
-from shapespace.numerics.system import AbstractSystem
+from shapespace.numerics.system import AbstractSystem, Symmetry
 from shapespace.physics.force import Pressure
 from shapespace.physics.species import Species
 from shapespace.physics.tension import Incompressibility
@@ -29,6 +30,8 @@ STATE_AND_FLUX = {
     "species": ("c", "species_flux"),
 }
 """For each rate the field it changes and the flux conjugate to it."""
+ODD = frozenset({"z", "psi", "alpha", "v", "azimuthal_force", "species_flux", "v0"})
+"""Fields and scalars that change sign when z -> -z and u -> 1 - u; psi goes to pi - psi."""
 
 
 class SurfaceSystem(AbstractSystem):
@@ -46,6 +49,25 @@ class SurfaceSystem(AbstractSystem):
     terms: TermFactory = eqx.field(static=True)
     species: Callable[[Any], Species] | None = eqx.field(static=True)
     ends: tuple[tuple[str, Any, Any], ...] = eqx.field(static=True)
+
+    @property
+    def symmetry(self) -> Symmetry | None:
+        """Closed surfaces: the mirror z -> -z, which exchanges the poles, where both have conditions of the same kind.
+
+        The density R is even. So of a field with sign s, its rate has s, its slope -s, and the flux P_w = dR/dw' conjugate to
+        it again -s, as the species flux has. alpha(0) = 0 is kept because alpha vanishes at both poles of a solution: the
+        mesh may be shifted along the meridian at no cost (its first integral is zero).
+        """
+        is_mirrored = all(type(start) is type(stop) for _, start, stop in self.ends)
+        if "v0" not in self.scalars or "area" in self.fields or not is_mirrored:
+            return None
+        return Symmetry(
+            flips=True,
+            factors=tuple(-1.0 if name in ODD else 1.0 for name in self.fields),
+            offsets=tuple(math.pi if name == "psi" else 0.0 for name in self.fields),
+            algebraic=(1.0,) * len(self.algebraic),
+            scalars=tuple(-1.0 if name in ODD else 1.0 for name in self.scalars),
+        )
 
     def named(self, p: Traced) -> Any:
         """Parameters by name."""

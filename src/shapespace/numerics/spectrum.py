@@ -1,0 +1,160 @@
+"""Eigenpairs of (J + s B) dx = 0 around a real shift, by Arnoldi iteration on S = (J + shift B)^-1 B.
+
+S dx = theta dx belongs to s = shift - 1/theta, so the eigenvalues next to the shift are the largest of S. B is singular and
+not symmetric (constraints and multipliers do not evolve). In Weierstrass form J + s B = diag(s I - A, I + s N), with N
+nilpotent, and S = diag((shift I - A)^-1, (I + shift N)^-1 N): infinite eigenvalues are the nilpotent part of S, and
+S^index annihilates it. The index is 1 where unknowns without rate follow from those with, and 2 where they are the
+multipliers of constraints on those with (a saddle point); rates come in from dissipation, which is definite on what the
+constraints leave free, so that there is nothing deeper. A start in the range of S^2 thus keeps the Krylov space among the
+finite modes. Round-off brings traces of the others back; each application removes them again, and so does the last one,
+which every returned mode gets.
+
+The inner product is the problem's (`weights`), so the work and the certainty do not depend on the mesh. Reference: Meerbergen
+and Spence, SIAM J. Matrix Anal. Appl. 18 (1997) 667.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapespace.base.arrays import Array
+from shapespace.base.problem import AbstractLinearisation, AbstractSmoothProblem, Rate
+
+ComplexArray = NDArray[np.complex128]
+Flags = NDArray[np.bool_]
+CONVERGED = 1e-11
+"""Ritz pairs with an estimated relative residual below this are eigenpairs to working accuracy."""
+SETTLED = 1e-4
+"""Ritz pairs with an estimated relative residual below this are on their way to an eigenvalue nearby."""
+BREAKDOWN = 1e-13
+"""A new direction that is a smaller part of its image than this is round-off: the space is invariant."""
+INFINITE = 1e-10
+"""Eigenvalues of S smaller than this part of the largest are zero but for round-off: their rates are infinite."""
+UNSEEN = 1e-4
+"""Mean square weight of entries that the problem's inner product leaves out: slopes and fields known at points only."""
+
+
+class Ritz(NamedTuple):
+    """Approximate eigenpairs, nearest to the shift first: rates s (m,), estimated residuals (m,), coefficients (j, m)."""
+
+    rates: ComplexArray
+    residuals: Array
+    coefficients: ComplexArray
+
+    @property
+    def settled(self) -> int:
+        """How many rates, counted from the shift outwards, stand for eigenvalues: none lies nearer than the last of them."""
+        return int(np.argmin(np.append(self.residuals <= SETTLED, False)))
+
+
+@dataclass(frozen=True)
+class Pencil:
+    """J + s B at a stationary state x, factorised at s = shift."""
+
+    problem: AbstractSmoothProblem
+    x: Array
+    p: Array
+    shift: float
+
+    @cached_property
+    def linearisation(self) -> AbstractLinearisation:
+        """Factors of J + shift B."""
+        rate = Rate.of_growth(self.problem.stored(self.x, self.p), self.shift)
+        return self.problem.linearise(self.x, self.p, rate)[1]
+
+    @cached_property
+    def weights(self) -> Array:
+        """Of the inner product: the problem's, and a little of what that does not see, so that only zero has no size."""
+        weights = self.problem.weights(self.x)
+        unseen = weights == 0.0
+        return np.where(unseen, UNSEEN / max(int(np.count_nonzero(unseen)), 1), weights)
+
+    def size(self, mode: Array | ComplexArray) -> float:
+        """Norm of an increment."""
+        size = np.abs(mode)
+        return float(np.sqrt(self.weights @ (size * size)))
+
+    def apply(self, dx: Array) -> Array:
+        """S dx = (J + shift B)^-1 B dx."""
+        return self.linearisation.solve(self.problem.mass(self.x, self.p, dx))
+
+    def defect(self, rate: complex, mode: ComplexArray) -> ComplexArray:
+        """(J + shift B)^-1 (J + rate B) mode: zero for an eigenpair; mode - defect is one inverse iteration further."""
+        zero = np.zeros_like(self.p)
+        real, imaginary = np.ascontiguousarray(mode.real), np.ascontiguousarray(mode.imag)
+
+        def parts(dx: Array) -> tuple[Array, Array]:
+            if not dx.any():
+                return dx, dx
+            return self.problem.derivative(self.x, self.p, dx, zero), self.problem.mass(self.x, self.p, dx)
+
+        (j_re, b_re), (j_im, b_im) = parts(real), parts(imaginary)
+        first = self.linearisation.solve(j_re + rate.real * b_re - rate.imag * b_im)
+        if rate.imag == 0.0 and not imaginary.any():
+            return first.astype(np.complex128)
+        return first + 1j * self.linearisation.solve(j_im + rate.real * b_im + rate.imag * b_re)
+
+
+class Krylov:
+    """The space spanned by powers of S on a random start: an orthonormal basis (j, n), and S in it (j + 1, j)."""
+
+    def __init__(self, pencil: Pencil, capacity: int, seed: int) -> None:
+        n = len(pencil.x)
+        self.pencil = pencil
+        self.dimension = 0
+        self.applications = 2
+        self._basis = np.empty((capacity + 1, n))
+        self._weighted = np.empty_like(self._basis)
+        self._matrix = np.zeros((capacity + 1, capacity))
+        # Random, so that no mode is left out: from a start of one parity the others would never appear.
+        start = pencil.apply(pencil.apply(np.random.default_rng(seed).standard_normal(n)))
+        size = pencil.size(start)
+        if size > 0.0:
+            self._keep(0, start / size)
+        self.is_invariant = not size > 0.0
+
+    def _keep(self, index: int, vector: Array) -> None:
+        self._basis[index] = vector
+        self._weighted[index] = self.pencil.weights * vector
+
+    def extend(self, dimension: int) -> None:
+        """Apply S until the space has this dimension, or is invariant; orthogonalised twice, which is enough."""
+        while self.dimension < min(dimension, self._matrix.shape[1]) and not self.is_invariant:
+            j = self.dimension
+            image = self.pencil.apply(self._basis[j])
+            self.applications += 1
+            size, parts = self.pencil.size(image), np.zeros(j + 1)
+            for _ in range(2):
+                more = self._weighted[: j + 1] @ image
+                image -= more @ self._basis[: j + 1]
+                parts += more
+            rest = self.pencil.size(image)
+            self._matrix[: j + 1, j] = parts
+            self.dimension = j + 1
+            if not rest > BREAKDOWN * size:
+                self.is_invariant = True
+            else:
+                self._matrix[j + 1, j] = rest
+                self._keep(j + 1, image / rest)
+
+    def ritz(self) -> Ritz:
+        """The approximate eigenpairs that the space holds."""
+        j = self.dimension
+        theta, coefficients = np.linalg.eig(self._matrix[:j, :j])
+        order = np.lexsort((-theta.imag, -np.abs(theta)))
+        order = order[np.abs(theta[order]) > INFINITE * np.abs(theta).max(initial=0.0)]
+        theta, coefficients = theta[order].astype(complex), coefficients[:, order].astype(complex)
+        residuals = self._matrix[j, j - 1] * np.abs(coefficients[-1]) / np.abs(theta)
+        return Ritz(self.pencil.shift - 1.0 / theta, residuals, coefficients)
+
+    def conditions(self, ritz: Ritz) -> Array:
+        """Condition numbers (j,) of the eigenvalues of S in the space: 1 for orthogonal modes, large near a double rate."""
+        left = np.linalg.pinv(ritz.coefficients, rcond=1e-15)
+        return np.linalg.norm(left, axis=1) * np.linalg.norm(ritz.coefficients, axis=0)
+
+    def modes(self, coefficients: ComplexArray) -> ComplexArray:
+        """Increments (m, n) of coefficients (j, m) in the basis."""
+        return np.asarray(coefficients.T @ self._basis[: self.dimension])
