@@ -13,6 +13,14 @@ compiled = njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"},
 
 
 @compiled
+def copy(target, source):  # type: ignore[no-untyped-def]
+    """target[...] = source for matrices of one shape: numba compiles that for many seconds, because it may broadcast."""
+    for i in range(target.shape[0]):
+        for c in range(target.shape[1]):
+            target[i, c] = source[i, c]
+
+
+@compiled
 def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]
     """LU in place of the first len(pivot) columns of a (rows, cols), pivots from the first n_pivot_rows rows.
 
@@ -76,10 +84,10 @@ def forward(lu, pivot, x):  # type: ignore[no-untyped-def]
 
 @compiled
 def backward(lu, size, x):  # type: ignore[no-untyped-def]
-    """Solve U x = b in place for the leading upper triangle of order `size`."""
+    """Solve U x = b in place for the leading `size` unknowns; any x beyond them is known and stays."""
     for i in range(size - 1, -1, -1):
         row = lu[i]
         total = 0.0
-        for j in range(i + 1, size):
+        for j in range(i + 1, x.shape[0]):
             total += row[j] * x[j]
         x[i] = (x[i] - total) / row[i]
