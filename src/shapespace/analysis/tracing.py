@@ -107,9 +107,9 @@ def between(bracket: Bracket) -> tuple[Array, Array]:
     cubic = hermite(start.joined, start.tangent, end.joined, end.tangent, length)
     s = 0.5 * length
     if bracket.kind == "fold":
-        turns = real_roots(polyder(cubic[:, -1]), 0.0, length)
+        turns = real_roots(np.asarray(polyder(cubic[:, -1])), 0.0, length)
         s = float(turns[0]) if len(turns) else s
-    X, tangent = polyval(s, cubic), polyval(s, polyder(cubic))
+    X, tangent = np.asarray(polyval(s, cubic)), np.asarray(polyval(s, polyder(cubic)))
     weights = metric(problem, X)
     return X, tangent / np.sqrt(weights @ tangent**2)
 

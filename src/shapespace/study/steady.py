@@ -1,0 +1,203 @@
+"""Stationary states of a scenario: from a resting reference in closed form, by following it to the scenario's parameters."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from shapespace.analysis.bifurcation import Kind
+from shapespace.analysis.branch import Point
+from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
+from shapespace.analysis.extended import Parameter
+from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
+from shapespace.analysis.stationary import Stationary, solve_stationary
+from shapespace.analysis.tracing import Located, side_branches, traced
+from shapespace.base.arrays import Array
+from shapespace.base.errors import InputError
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import Rate
+from shapespace.numerics.newton import Newton
+from shapespace.numerics.state import State
+from shapespace.study.engine import Engine
+from shapespace.study.frame import Frame
+from shapespace.study.keyed import KeyedProblem
+from shapespace.study.observables import measure
+from shapespace.study.scenario import Scenario
+
+NEWTON = Newton(tolerance=1e-10)
+MAX_POINTS = 400
+"""Of the way from the reference to a scenario's parameters."""
+
+
+class StateName(StrEnum):
+    """Which stationary state of a scenario: the one it is named for, or the resting one."""
+
+    DEFAULT = "default"
+    TRIVIAL = "trivial"
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A stationary state of a scenario, or why there is none: `found.outcome`, with the best state met."""
+
+    scenario: Scenario
+    problem: KeyedProblem
+    found: Stationary
+
+    @property
+    def outcome(self) -> Outcome:
+        """How the search ended."""
+        return self.found.outcome
+
+    @property
+    def engine(self) -> Engine:
+        """What the scenario computes with, on the state's mesh."""
+        return replace(Engine.of(self.scenario), problem=self.problem.base)
+
+    @property
+    def observables(self) -> dict[str, float]:
+        """By their contract names, in the scenario's units."""
+        return observables_at(self.scenario, self.problem, self.found.x)
+
+    def spectrum(self, count: int = 6) -> Spectrum:
+        """Leading growth rates and modes, dimensionless."""
+        return solve_spectrum(self.problem, self.found.x, self.found.p, Spectral(count=count))
+
+    @property
+    def frame(self) -> Frame:
+        """The state as a frame at time zero, to store or to start from."""
+        return frame_of(self.problem, self.found.x, self.observables)
+
+
+def observables_at(scenario: Scenario, problem: KeyedProblem, x: Array) -> dict[str, float]:
+    """Observables of a state of the scenario at rest, in its units."""
+    engine = replace(Engine.of(scenario), problem=problem.base)
+    values = measure(engine, x, Rate.of_growth(problem.base.stored(x, engine.p)))
+    values.pop("energy")
+    return {name: value * scenario.scales.factor(name) for name, value in values.items()}
+
+
+def frame_of(problem: KeyedProblem, x: Array, observables: dict[str, float]) -> Frame:
+    """A state at rest as a frame."""
+    state = problem.base.unpack(x)
+    still = np.zeros((*state.slopes.shape[:2], 2))
+    return Frame(
+        0.0, 0.0, 0.0, state.mesh, state.nodes, state.slopes, state.algebraic, state.scalars, still, observables
+    )
+
+
+def state_of(frame: Frame) -> State:
+    """The state that a frame holds."""
+    return State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)
+
+
+def steady_from(scenario: Scenario, state: State, keys: tuple[str, ...] = ()) -> Steady:
+    """The stationary state of the scenario next to a given state, by Newton's method."""
+    keys = keys or (_main_key(scenario),)
+    problem = KeyedProblem.of(scenario, keys)
+    problem = replace(problem, base=problem.base.on_mesh(state.mesh))
+    found = solve_stationary(problem, problem.base.pack(state), key_values(scenario, keys), NEWTON)
+    return _steady(scenario, found)
+
+
+def solve_steady(scenario: Scenario, name: StateName = StateName.DEFAULT) -> Steady:
+    """The named stationary state of the scenario, from the resting sphere or the flat disc.
+
+    That reference solves the equations without a ring, a coat and a pull; these are then raised one after another along the
+    branch of states that leads on from it, through folds. Without a ring the default is the polarized, swimming state
+    on the branch that leaves the sphere at the first pitchfork in the Peclet number.
+    """
+    _check_has_isolated_states(scenario)
+    if scenario.model == "closed-surface":
+        sphere = scenario.with_overrides(
+            {"ring_amplitude": 0.0, "initial_background": 1.0, "initial_ring_amplitude": 0.0, "seed_amplitude": 0.0}
+        )
+        if scenario.values()["ring_amplitude"] == 0.0:
+            return _sphere(scenario, sphere) if name is StateName.TRIVIAL else _polarized(scenario, sphere)
+        return _raised(scenario, _sphere(sphere, sphere), ("ring_amplitude",))
+    flat = scenario.with_overrides({"spontaneous_curvature": 0.0, "pulling_force": 0.0})
+    start = steady_from(flat, Engine.of(flat).initial_state())
+    return start if name is StateName.TRIVIAL else _raised(scenario, start, ("spontaneous_curvature", "pulling_force"))
+
+
+def key_values(scenario: Scenario, keys: Sequence[str]) -> Array:
+    """Values of keys, in the scenario's units."""
+    values = scenario.values()
+    return np.array([float(values[key]) for key in keys])
+
+
+def follow(start: Steady, key: str, value: float) -> Steady:
+    """The state that a known one becomes along its branch when one key goes to a value, wherever the branch turns."""
+    scenario = start.scenario.with_overrides({key: value})
+    problem = KeyedProblem.of(start.scenario, (key,))
+    problem = replace(problem, base=start.problem.base)
+    at = key_values(start.scenario, (key,))
+    if at[0] == value:
+        return replace(start, scenario=scenario)
+    first = start_point(problem, start.found.x, at, 0, float(np.sign(value - at[0])), _steps(value - at[0]))
+    if isinstance(first, Outcome):
+        return replace(start, found=replace(start.found, outcome=first))
+    return _along(scenario, first, value)
+
+
+def _along(scenario: Scenario, first: Point, value: float) -> Steady:
+    """The end of the branch from a point to a value of its parameter."""
+    branch = Continuation(
+        [first], [Stop(Parameter(0), value, "end", ends=True)], _steps(value - first.parameter), NEWTON
+    )
+    *_, last = [first, *branch]
+    if branch.outcome is not Outcome.REACHED_STOP:
+        found = Stationary(last.problem, last.x, last.p, Outcome.NOT_REACHED, np.nan, np.nan, 0, False)
+    else:
+        found = solve_stationary(last.problem, last.x, last.p, NEWTON)
+    return _steady(scenario, found)
+
+
+def _steps(span: float) -> Arclength:
+    return Arclength(first=0.02, parameter_scale=abs(span), max_points=MAX_POINTS)
+
+
+def _steady(scenario: Scenario, found: Stationary) -> Steady:
+    assert isinstance(found.problem, KeyedProblem)
+    return Steady(scenario, found.problem, found)
+
+
+def _main_key(scenario: Scenario) -> str:
+    return "peclet" if scenario.model == "closed-surface" else "spontaneous_curvature"
+
+
+def _sphere(scenario: Scenario, sphere: Scenario) -> Steady:
+    """The resting sphere with the uniform reference concentration."""
+    return steady_from(scenario, Engine.of(sphere).initial_state())
+
+
+def _raised(scenario: Scenario, start: Steady, keys: Sequence[str]) -> Steady:
+    """Raise keys from zero to their values one after another."""
+    for key in keys:
+        if not start.outcome.is_success:
+            break
+        start = follow(start, key, float(scenario.values()[key]))
+    return replace(start, scenario=scenario) if start.outcome.is_success else start
+
+
+def _polarized(scenario: Scenario, sphere: Scenario) -> Steady:
+    """The swimming state on the branch that leaves the sphere at its first pitchfork in the Peclet number."""
+    goal = float(scenario.values()["peclet"])
+    resting = _sphere(sphere.with_overrides({"peclet": 0.0}), sphere.with_overrides({"peclet": 0.0}))
+    first = start_point(resting.problem, resting.found.x, np.zeros(1), 0, 1.0, _steps(1.0))
+    assert isinstance(first, Point)
+    branch = Continuation([first], (), Arclength(first=0.1, largest=0.2, max_points=MAX_POINTS), NEWTON)
+    for one in traced(branch):
+        if isinstance(one, Located) and one.point.kind is Kind.PITCHFORK:
+            side = side_branches(one.point, one.bracket.after.tangent, 0.02)[0]
+            return _along(scenario, side, goal)
+    return replace(resting, found=replace(resting.found, outcome=Outcome.NOT_REACHED))
+
+
+def _check_has_isolated_states(scenario: Scenario) -> None:
+    if scenario.model == "closed-surface" and scenario.values()["turnover_rate"] == 0.0:
+        raise InputError(
+            "turnover_rate = 0: conserves the regulator, so that stationary states come in families that no equation tells "
+            "apart; choose a turnover_rate > 0."
+        )

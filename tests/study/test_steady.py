@@ -1,0 +1,88 @@
+"""Stationary states of scenarios: they solve the equations, obey exact laws, and are where the dynamics ends."""
+
+import numpy as np
+import pytest
+
+from shapespace.base.errors import InputError
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import Rate
+from shapespace.numerics.newton import solve_root
+from shapespace.study.run import run
+from shapespace.study.scenario import scenario
+from shapespace.study.steady import NEWTON, StateName, Steady, key_values, solve_steady, state_of, steady_from
+
+
+def assert_solved(steady: Steady) -> None:
+    """Converged, on a settled mesh, and found again in at most two iterations from its own frame."""
+    assert steady.outcome is Outcome.CONVERGED
+    assert steady.found.settled
+    again = steady_from(steady.scenario, state_of(steady.frame), steady.problem.keys)
+    problem = again.problem
+    p = key_values(steady.scenario, steady.problem.keys)
+    x = problem.base.pack(state_of(steady.frame))
+    root = solve_root(problem, x, p, Rate.of_growth(problem.stored(x, p)), NEWTON)
+    assert root.outcome is Outcome.CONVERGED
+    assert root.iterations <= 2
+
+
+def test_the_resting_sphere():
+    """`--state trivial`: p = 2 T/R (exact result 1 at C0 = 0), at rest and round."""
+    case = scenario("polar-swimmer", elements=20)
+    steady = solve_steady(case, StateName.TRIVIAL)
+    assert_solved(steady)
+    tension = case.parameters.tension + case.parameters.active_tension / 2.0  # type: ignore[union-attr]
+    assert steady.observables["pressure"] == pytest.approx(2.0 * tension, rel=1e-9)
+    assert abs(steady.observables["velocity"]) < 1e-9
+    assert abs(steady.observables["polarity"]) < 1e-9
+
+
+def test_the_swimmer_just_beyond_its_pitchfork():
+    """U = -(R/2) (xi dmu)_0 f'(c0) dc/eta_b for c = c0 + dc cos(theta) (exact result 4), to second order in dc."""
+    misses, sizes = [], []
+    for peclet in (22.04, 22.01):
+        steady = solve_steady(scenario("polar-swimmer", elements=20, peclet=peclet))
+        assert_solved(steady)
+        state = state_of(steady.frame)
+        column = steady.engine.system.fields.index("c")
+        top, bottom = state.nodes[0, column], state.nodes[-1, column]
+        amplitude = 0.5 * (top - bottom)
+        law = -0.5 * peclet * 0.5 * amplitude
+        misses.append(abs(steady.observables["velocity"] / law - 1.0))
+        sizes.append(abs(amplitude))
+    assert misses[0] < 0.02
+    order = np.log(misses[0] / misses[1]) / np.log(sizes[0] / sizes[1])
+    assert abs(order - 2.0) < 0.2, f"misses {misses} at amplitudes {sizes}"
+
+
+def test_below_the_pitchfork_there_is_no_swimmer():
+    """The search says so, with the parameters it got to, and does not pass off the sphere as a swimmer."""
+    steady = solve_steady(scenario("polar-swimmer", elements=20, peclet=15.0))
+    assert steady.outcome is Outcome.NOT_REACHED
+
+
+def test_conserved_regulator_is_refused():
+    with pytest.raises(InputError, match="turnover_rate = 0"):
+        solve_steady(scenario("polar-swimmer", turnover_rate=0.0))
+
+
+def test_the_flat_disc_and_the_protrusion():
+    """Without coat and pull the disc is flat; the protrusion is where the dynamics of the same scenario ends."""
+    case = scenario("membrane-protrusion", elements=20, spontaneous_curvature=4.0)
+    flat = solve_steady(case, StateName.TRIVIAL)
+    assert_solved(flat)
+    assert abs(flat.observables["height"]) < 1e-12
+    steady = solve_steady(case)
+    assert_solved(steady)
+    end = run(case.with_overrides({"time_tolerance": 1e-5}))
+    assert end.outcome is Outcome.STATIONARY
+    assert steady.observables["height"] == pytest.approx(end.observables["height"], rel=1e-4)
+
+
+@pytest.mark.slow
+def test_the_divided_surface_is_where_division_ends():
+    """Through two folds in the ring's amplitude to the neck that the dynamics ends in, symmetric and at rest."""
+    steady = solve_steady(scenario("guided-division"))
+    assert_solved(steady)
+    end = run(scenario("guided-division"))
+    assert steady.observables["neck_radius"] == pytest.approx(end.observables["neck_radius"], rel=1e-6)
+    assert abs(steady.observables["velocity"]) < 1e-9
