@@ -16,6 +16,8 @@ from shapespace.numerics.newton import Newton, solve_root
 
 MEMORY = 4
 """Points that decide how a branch goes on: the last, and an earlier one at a distance fit for extrapolation."""
+MAX_GROWTH = 3.0
+"""Largest ratio of successive steps."""
 AT_VALUE = 1e-9
 """A measure within this of a value, relative to it (or one), is there."""
 WORST_MISS = 20.0
@@ -37,7 +39,7 @@ class Arclength:
     largest: float = 0.2
     prediction: float = 3e-3
     turn: float = 0.4
-    crossing: float = 5e-3
+    crossing: float = 2e-3
     parameter_scale: float = 0.0
     max_points: int = 1000
 
@@ -199,7 +201,7 @@ class _Trial:
             return None
         if step > options.crossing and self.now.sign * point.sign < 0.0:
             return None
-        factor = min(2.0, 0.9 * max(error, 1e-12) ** (-1.0 / order), 0.5 / max(turn, 1e-12))
+        factor = min(MAX_GROWTH, 0.9 * max(error, 1e-12) ** (-1.0 / order), 0.5 / max(turn, 1e-12))
         if root.jacobians > 2:
             factor = min(factor, 0.7)
         following = min(max(factor, 0.2) * step, options.largest)
