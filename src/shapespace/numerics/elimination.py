@@ -71,7 +71,7 @@ def make_plan(widths: Array, matrix: Array, points: Array, n: int, n_equations: 
     rows, columns, k, _ = points.shape
     reach = 0.1 * float(widths.max() * matrix.diagonal().max())
     decades = _decades(points.reshape(rows, columns, -1), n_equations, n, reach)
-    return _plan(decades.tobytes(), n_equations, n, columns, k)
+    return _matched(decades.tobytes(), n_equations, n, columns, k)
 
 
 @compiled
@@ -94,13 +94,21 @@ def _decades(points, m, n, reach):  # type: ignore[no-untyped-def]
 
 
 @lru_cache(maxsize=256)
-def _plan(decades: bytes, m: int, n: int, columns: int, k: int) -> Plan:
-    """Match rows to unknowns by size, order the pivots, list the operations."""
+def _matched(decades: bytes, m: int, n: int, columns: int, k: int) -> Plan:
+    """The plan that matches rows to unknowns by size."""
     entries = np.frombuffer(decades, dtype=np.int8).reshape(m, columns)
-    structure, own, size = entries != ABSENT, entries[:, :m].copy(), k * m
+    own = entries[:, :m].copy()
     own[:, :n] = np.maximum(own[:, :n], entries[:, m : m + n])
     _, partner = linear_sum_assignment(np.where(own == ABSENT, 1e3, -own.astype(float)))
-    stages = np.zeros((k, m, size + columns - m), dtype=bool)
+    return _plan((entries != ABSENT).tobytes(), tuple(partner.tolist()), n, k)
+
+
+@lru_cache(maxsize=64)
+def _plan(non_zeros: bytes, partners: tuple[int, ...], n: int, k: int) -> Plan:
+    """Order the pivots and list the operations: some ms, but sizes change more often than the matching."""
+    m, size, partner = len(partners), k * len(partners), np.array(partners)
+    structure = np.frombuffer(non_zeros, dtype=bool).reshape(m, -1)
+    stages = np.zeros((k, m, size + structure.shape[1] - m), dtype=bool)
     for j in range(k):
         stages[j, partner, j * m : (j + 1) * m] = structure[:, :m]
         for stage in range(k):
@@ -109,7 +117,7 @@ def _plan(decades: bytes, m: int, n: int, columns: int, k: int) -> Plan:
     pattern = stages.reshape(size, -1)
     order = _pivot_order(pattern.copy())
     pattern = pattern[order][:, np.concatenate([order, np.arange(size, pattern.shape[1])])]
-    return Plan(np.argsort(order), np.asarray(partner, dtype=np.int64), structure, *_operations(pattern))
+    return Plan(np.argsort(order), partner, structure, *_operations(pattern))
 
 
 def _pivot_order(pattern: BoolArray) -> IntArray:
@@ -316,20 +324,9 @@ def _eliminate_all(  # type: ignore[no-untyped-def]
     dense, relation_scale = np.zeros((count, size + n, size + 2 * n + n_s)), np.ones((count, n))
     exchanges = np.zeros((count, size), dtype=np.int64)
     regular = _eliminate_pivoted(
-        widths,
-        weights,
-        position,
-        slot,
-        filled,
-        jumps,
-        m,
-        response,
-        pivoted,
-        dense,
-        exchanges,
-        relations,
+        widths, weights, position, slot, filled, jumps, m, response, pivoted, dense, exchanges, relations,
         relation_scale,
-    )
+    )  # fmt: skip
     return (work, response, scale, pivoted, dense, exchanges, relation_scale), relations, regular
 
 
