@@ -71,8 +71,9 @@ def test_guided_division_stays_symmetric():
             values = state.nodes[:, engine.system.fields.index(name)]
             worst[name] = max(worst[name], float(np.abs(values - sign * values[::-1]).max()))
         worst["mesh"] = max(worst["mesh"], float(np.abs(state.mesh + state.mesh[::-1] - 1.0).max()))
-        # Velocities are differences over the step: their round-off grows as the step shrinks.
-        worst["v0"] = max(worst["v0"], abs(state.scalars[2]) * min(moment.step / 1e-4, 1.0))
+        # The last digit of z, over the step, is a velocity, and what holds the surface against it is friction alone.
+        digit = np.finfo(float).eps / (engine.values["friction"] * min(moment.step, 1e-4))
+        worst["v0"] = max(worst["v0"], 1e-11 * abs(state.scalars[2]) / digit)
     assert max(worst.values()) < 1e-11, f"asymmetry {worst}"
     assert worst["r"] < 1e-13, f"asymmetry of r {worst['r']:.1e}"
 

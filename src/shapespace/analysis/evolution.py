@@ -117,7 +117,7 @@ class Evolution:
             else:
                 root, rate = self._solve(problem, trial, order)
             if root.outcome is not Outcome.CONVERGED:
-                if options.fixed_step:
+                if options.fixed_step or len(self._times) == 1:
                     break
                 step = 0.25 * trial
                 continue
@@ -143,18 +143,23 @@ class Evolution:
 
         Newton then fails at small steps from that state, but not at larger ones, from which smaller ones are reached.
         """
-        root, rate = self._solve(problem, step, 1)
-        larger, largest = step, min(START_LIMIT * step, self.until - self._times[0])
-        while root.outcome is not Outcome.CONVERGED and larger < largest:
-            larger = min(4.0 * larger, largest)
-            root, rate = self._solve(problem, larger, 1)
-        while root.outcome is Outcome.CONVERGED and larger > step:
-            shorter = max(0.25 * larger, step)
-            smaller, smaller_rate = self._solve(problem, shorter, 1, root.x)
-            if smaller.outcome is not Outcome.CONVERGED:
+        length, largest = step, min(START_LIMIT * step, self.until - self._times[0])
+        root, rate = self._solve(problem, length, 1)
+        while root.outcome is not Outcome.CONVERGED and length < largest:
+            length = min(4.0 * length, largest)
+            root, rate = self._solve(problem, length, 1)
+        while root.outcome is Outcome.CONVERGED and length > step:
+            shorter = max(0.25 * length, step)
+            found = self._solve(problem, shorter, 1, root.x)
+            if found[0].outcome is not Outcome.CONVERGED:
                 break
-            larger, root, rate = shorter, smaller, smaller_rate
-        return (larger if root.outcome is Outcome.CONVERGED else step), root, rate
+            length, (root, rate) = shorter, found
+        if root.outcome is not Outcome.CONVERGED:
+            length = step
+        while root.outcome is not Outcome.CONVERGED and length >= self.stepping.min_step:
+            length *= 0.25
+            root, rate = self._solve(problem, length, 1)
+        return length, root, rate
 
     def _within(self, step: float) -> float:
         """The step, shortened to land on `until`, or halved where it would leave a sliver before it."""
