@@ -41,10 +41,15 @@ class GaussRule:
 
     def interpolation_constant(self) -> float:
         """max over x of |prod_l (x - x_l) integrated|: the factor of w^(k+1) y^(k+1) in the interpolation error."""
-        x = np.linspace(0.0, 1.0, 201)
-        nodal = np.prod(x[:, None] - self.points, axis=1)
-        integral = np.concatenate([[0.0], np.cumsum(0.5 * (nodal[1:] + nodal[:-1])) * (x[1] - x[0])])
-        return float(np.abs(integral).max() / np.prod(np.arange(1.0, self.degree + 1)))
+        return _interpolation_constant(self.degree)
+
+
+@cache
+def _interpolation_constant(degree: int) -> float:
+    x = np.linspace(0.0, 1.0, 201)
+    nodal = np.prod(x[:, None] - gauss_rule(degree).points, axis=1)
+    integral = np.concatenate([[0.0], np.cumsum(0.5 * (nodal[1:] + nodal[:-1])) * (x[1] - x[0])])
+    return float(np.abs(integral).max() / np.prod(np.arange(1.0, degree + 1)))
 
 
 @cache
