@@ -9,10 +9,8 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractContinuableProblem, Rate
 from shapespace.numerics.newton import Newton, solve_root
 
-STEP_NEWTON = Newton(round_off=1e-9, max_iterations=12, min_damping=1.0 / 32.0)
-"""Patience on the way to other parameters: where Newton needs more, a shorter step is cheaper. Near branch points round-off
-grows with the inverse of their distance.
-"""
+STEP_NEWTON = Newton(max_iterations=12, min_damping=1.0 / 32.0)
+"""Patience on the way to other parameters: where Newton needs more, a shorter step is cheaper."""
 LARGEST_MISS = 0.5
 """How far from its prediction, relative to itself, a state may be that counts as the same one at other parameters."""
 
