@@ -9,7 +9,6 @@ from benchmarks.timing import machine, milliseconds, use_one_core
 
 use_one_core()
 
-import jax  # noqa: E402  (threads are set before the libraries load)
 import numpy as np  # noqa: E402
 from scipy.linalg import solve_banded  # noqa: E402
 
@@ -53,9 +52,7 @@ def main() -> None:
     p, n, rule = engine.p, problem.n, gauss_rule(problem.degree)
     residual, linear = problem.linearise(x, p, rate)
     widths = np.diff(problem.mesh)
-    arguments = (problem.mesh, x, rate.history, rate.coefficient, p)
-    out = [np.asarray(part) for part in problem.functions.linearised(*arguments)]
-    _, points, ends, targets = out
+    _, points, ends, targets = problem.blocks(x, p, rate)
     plan = make_plan(widths, rule.matrix, points, n, problem.n_rows)
     jumps = np.zeros((problem.elements, n, len(targets[0])))
     size = (problem.elements + 1) * n
@@ -63,7 +60,7 @@ def main() -> None:
     borders = np.ones((size, 4))
     rows = {
         "whole iteration (linearise + solve)": lambda: problem.linearise(x, p, rate)[1].solve(residual),
-        "  residual and Jacobian (JAX)": lambda: jax.block_until_ready(problem.functions.linearised(*arguments)),
+        "  residual and Jacobian (JAX)": lambda: problem.blocks(x, p, rate),
         "  factorisation (numba)": lambda: condensation.factorise(
             widths, rule.matrix, rule.weights, points, ends, targets, n
         ),

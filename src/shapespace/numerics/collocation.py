@@ -1,18 +1,20 @@
 """Gauss collocation of an AbstractSystem: residual, structured Jacobian and stored quantities on a given mesh."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
-import jax.numpy as jnp
 import numpy as np
 
-from shapespace.base.arrays import Array, Traced
+from shapespace.base.arrays import Array
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Border, Rate
 from shapespace.numerics import condensation
 from shapespace.numerics.adaptation import adapted_mesh
 from shapespace.numerics.border import with_border
 from shapespace.numerics.gauss import gauss_rule
-from shapespace.numerics.pointwise import Density, Functions, compiled_functions
+from shapespace.numerics.layout import by_element, by_stage, continuity, lay_out
+from shapespace.numerics.pointwise import TILES, Density, Functions, Tile, Values, compiled_functions
 from shapespace.numerics.small_lu import compiled
 from shapespace.numerics.state import State
 from shapespace.numerics.system import AbstractSystem
@@ -71,17 +73,17 @@ class CollocationProblem(AbstractSmoothProblem):
     n_integrals: int
     tolerance: float = 1e-6
 
-    @property
+    @cached_property
     def elements(self) -> int:
         """Number of elements N."""
         return len(self.mesh) - 1
 
-    @property
+    @cached_property
     def n(self) -> int:
         """Number of differential fields."""
         return len(self.system.fields)
 
-    @property
+    @cached_property
     def n_rows(self) -> int:
         """Equations per point, n + n_a."""
         return self.n + len(self.system.algebraic)
@@ -110,26 +112,76 @@ class CollocationProblem(AbstractSmoothProblem):
 
     @cached_property
     def functions(self) -> Functions:
-        """Compiled evaluations; arguments (mesh, x, history, coefficient, p)."""
-        return compiled_functions(self.system, self.degree)
+        """Compiled functions of tiles of points."""
+        return compiled_functions(self.system)
 
     @cached_property
-    def _device_mesh(self) -> Traced:
-        return jnp.asarray(self.mesh)
+    def _points(self) -> int:
+        return self.elements * self.degree
+
+    @cached_property
+    def _tile(self) -> int:
+        """Points per tile."""
+        return next((size for size in TILES if size >= self._points), TILES[-1])
+
+    @cached_property
+    def _padded(self) -> int:
+        return -(-self._points // self._tile) * self._tile
+
+    @cached_property
+    def _u(self) -> Array:
+        """u at the points, padded."""
+        points = self.mesh[:-1, None] + self._widths[:, None] * gauss_rule(self.degree).points
+        return by_stage(points.reshape(-1, 1), self.degree, self._padded)[:, 0]
+
+    @cached_property
+    def _shares(self) -> Array:
+        """Quadrature weights of the points."""
+        return np.asarray((gauss_rule(self.degree).weights[:, None] * self._widths).ravel())
+
+    def _rows(self, x: Array) -> tuple[Array, Array]:
+        """Rows of all points, padded, and the ends; linear in x."""
+        rule = gauss_rule(self.degree)
+        rows, ends = lay_out(x, self._widths, rule.matrix, self.n, self.n_rows - self.n, self._padded)
+        return rows, ends
+
+    def _tiles(self, x: Array, history: Array) -> list[Tile]:
+        """All points, and the ends with each tile."""
+        rows, ends = self._rows(x)
+        history = history.reshape(self._points + 2, -1)
+        inner = by_stage(history[:-2], self.degree, self._padded)
+        return [Tile(rows[cut], inner[cut], self._u[cut], ends, history[-2:]) for cut in self._cuts]
+
+    def _assembled(self, parts: Sequence[Values], x: Array) -> Array:
+        """The flat residual from the values on all tiles: equations, continuity, end conditions, integral conditions."""
+        rows = _joined([part.rows for part in parts])[: self._points]
+        jumps = continuity(x, self._widths, gauss_rule(self.degree).weights, self.n)
+        ends, targets = np.asarray(parts[0].ends), np.asarray(parts[0].targets)
+        equations = by_element(rows[:, : self.n_rows], self.degree)
+        integrals = self._shares @ rows[:, self.n_rows :] - targets
+        return np.concatenate([equations.ravel(), jumps, ends, integrals])
 
     def residual(self, x: Array, p: Array, rate: Rate) -> Array:
         """Equations at the Gauss points, continuity, end conditions, integral conditions."""
-        return np.asarray(self.functions.residual(self._device_mesh, x, rate.history, rate.coefficient, p))
+        parts = [self.functions.values(tile, rate.coefficient, p) for tile in self._tiles(x, rate.history)]
+        return self._assembled(parts, x)
+
+    def blocks(self, x: Array, p: Array, rate: Rate) -> tuple[Array, Array, Array, Array]:
+        """Residual, and the Jacobian's blocks: points (m + n_i, m + n + n_s, k, N), ends, targets."""
+        tiles = self._tiles(x, rate.history)
+        out = [self.functions.linearised(tile, rate.coefficient, p) for tile in tiles]
+        slopes = out[0][1]
+        joined = _joined([part.rows for _, part in out], axis=-1)[..., : self._points]
+        points = np.ascontiguousarray(joined).reshape(*joined.shape[:2], self.degree, self.elements)
+        residual = self._assembled([values for values, _ in out], x)
+        return residual, points, np.asarray(slopes.ends), np.asarray(slopes.targets)
 
     def linearise(
         self, x: Array, p: Array, rate: Rate, border: Border | None = None
     ) -> tuple[Array, CollocationLinearisation]:
         """Residual and factorised Jacobian. A border's columns become scalars, its rows integral conditions."""
-        out = self.functions.linearised(self._device_mesh, x, rate.history, rate.coefficient, p)
-        residual, *blocks = (np.asarray(part) for part in out)
-        rule = gauss_rule(self.degree)
-        points, ends, targets = blocks
-        extra: list[Array] = []
+        residual, points, ends, targets = self.blocks(x, p, rate)
+        rule, extra = gauss_rule(self.degree), []
         if border is not None:
             points, ends, targets, *extra = with_border(
                 border, self._widths, rule.weights, self.n, points, ends, targets
@@ -137,27 +189,51 @@ class CollocationProblem(AbstractSmoothProblem):
         factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *extra)
         return residual, CollocationLinearisation(self, factors)
 
+    @cached_property
+    def _cuts(self) -> list[slice]:
+        return [slice(start, start + self._tile) for start in range(0, self._padded, self._tile)]
+
     def derivative(self, x: Array, p: Array, dx: Array, dp: Array) -> Array:
         """F_x dx + F_p dp at rest, flat as the residual."""
-        return np.asarray(self.functions.derivative(self._device_mesh, x, p, dx, dp))
+        (rows, ends), (drows, dends) = self._rows(x), self._rows(dx)
+        parts = [
+            self.functions.derivative(self._u[cut], (rows[cut], ends, p), (drows[cut], dends, dp)) for cut in self._cuts
+        ]
+        return self._assembled(parts, dx)
 
     def second_derivative(self, x: Array, p: Array, one: Array, dp: Array, other: Array, ep: Array) -> Array:
         """F'' along (one, dp) and (other, ep) at rest, flat as the residual."""
-        return np.asarray(self.functions.second_derivative(self._device_mesh, x, p, one, dp, other, ep))
+        (rows, ends), (d, dends), (e, eends) = self._rows(x), self._rows(one), self._rows(other)
+        parts = [
+            self.functions.second_derivative(
+                self._u[cut], (rows[cut], ends, p), (d[cut], dends, dp), (e[cut], eends, ep)
+            )
+            for cut in self._cuts
+        ]
+        return self._assembled(parts, np.zeros_like(x))
 
     def mass(self, x: Array, p: Array, dx: Array) -> Array:
         """dF/d(dq/dt) dq/dx dx at rest, flat as the residual."""
-        return np.asarray(self.functions.mass(self._device_mesh, x, p, dx))
+        (rows, ends), (drows, dends) = self._rows(x), self._rows(dx)
+        parts = [self.functions.mass(self._u[cut], (rows[cut], ends, p), drows[cut], dends) for cut in self._cuts]
+        return self._assembled(parts, np.zeros_like(x))
 
     def stored(self, x: Array, p: Array) -> Array:
         """q at the Gauss points and at both ends, flattened."""
-        return np.asarray(self.functions.stored(self._device_mesh, x))
+        rows, ends = self._rows(x)
+        parts = [self.functions.stored(rows[cut], ends) for cut in self._cuts]
+        inner = by_element(_joined([part for part, _ in parts])[: self._points], self.degree)
+        return np.concatenate([inner, np.asarray(parts[0][1])]).ravel()
 
     def integrals(self, density: Density, x: Array, p: Array, rate: Rate) -> tuple[dict[str, float], dict[str, float]]:
         """Gauss quadrature of density(system, dy, y, a, s, dq, p) over u, by name, and the largest point values."""
-        out = self.functions.integrals(density, self._device_mesh, x, rate.history, rate.coefficient, p)
-        sums, peaks = ({name: float(value) for name, value in part.items()} for part in out)
-        return sums, peaks
+        parts = [
+            self.functions.densities(density, tile.rows, tile.history, rate.coefficient, p)
+            for tile in self._tiles(x, rate.history)
+        ]
+        values = {name: _joined([part[name] for part in parts])[: self._points] for name in parts[0]}
+        sums = {name: float(self._shares @ value) for name, value in values.items()}
+        return sums, {name: float(value.max()) for name, value in values.items()}
 
     def rates(self, x: Array, p: Array, rate: Rate) -> Array:
         """dq/dt at the Gauss points, (N, k, n_q)."""
@@ -222,3 +298,8 @@ class CollocationProblem(AbstractSmoothProblem):
         if symmetry is None:
             return None
         return self.pack(self.unpack(x).reflected(symmetry, increment).on_mesh(self.mesh))
+
+
+def _joined(parts: Sequence[Any], axis: int = 0) -> Array:
+    """Results of all tiles, one after another."""
+    return np.asarray(parts[0]) if len(parts) == 1 else np.concatenate(parts, axis=axis)

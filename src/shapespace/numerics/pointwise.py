@@ -1,51 +1,45 @@
-"""The equations of an AbstractSystem at all Gauss points of a mesh, and their derivatives, as compiled functions of arrays."""
+"""The equations of an AbstractSystem and their derivatives at a tile of points and at both ends, compiled once per system.
+
+Meshes differ in their numbers of points; compiled functions see tiles of fixed sizes only, so that no mesh ever waits for
+the compiler. A point is a row v = (slope, algebraic, field, scalars), the ends are one vector (y(0), y(1), scalars).
+"""
 
 from collections.abc import Callable
 from functools import cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from shapespace.base.arrays import Traced
-from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.system import AbstractSystem
 
 Density = Callable[..., dict[str, Traced]]
+"""Named densities of (system, dy, y, a, s, dq, p) at one point."""
+
+TILES = (80, 160)
+"""Numbers of points per tile: padding costs little on small meshes, and large ones take several tiles."""
 
 
-class _Points(NamedTuple):
-    """What a packed vector x says at the points: rows (N k, 2n + n_a + n_s) of (slope, algebraic, field, scalars)."""
+class Tile(NamedTuple):
+    """Where to evaluate. rows (T, 2n + n_a + n_s), history (T, n_q), u (T,); ends (2n + n_s,), end_history (2, n_q).
+
+    Arrays of the host or of the compiler.
+    """
+
+    rows: Any
+    history: Any
+    u: Any
+    ends: Any
+    end_history: Any
+
+
+class Values(NamedTuple):
+    """rows (T, m + n_i): equations, then integrands; ends (n_b,): end conditions; targets (n_i,)."""
 
     rows: Traced
     ends: Traced
-    u: Traced
-    scalars: Traced
-    continuity: Traced
-    weights: Traced
-
-
-def _points(system: AbstractSystem, k: int, mesh: Traced, x: Traced) -> _Points:
-    """Unpack x = (nodes, slopes, algebraic, scalars) on a mesh and lay it out point by point, element after element."""
-    n, n_a, elements = len(system.fields), len(system.algebraic), mesh.shape[0] - 1
-    cuts = np.cumsum([(elements + 1) * n, elements * k * n, elements * k * n_a])
-    nodes, slopes, algebraic, scalars = jnp.split(x, cuts)
-    nodes, slopes = nodes.reshape(-1, n), slopes.reshape(elements, k, n)
-    rule, widths = gauss_rule(k), mesh[1:] - mesh[:-1]
-    values = nodes[:-1, None] + widths[:, None, None] * jnp.einsum("jl,eln->ejn", rule.matrix, slopes)
-    points = elements * k
-    spread = jnp.broadcast_to(scalars, (points, scalars.shape[0]))
-    flat = (slopes.reshape(points, n), algebraic.reshape(points, n_a), values.reshape(points, n), spread)
-    continuity = nodes[1:] - nodes[:-1] - widths[:, None] * jnp.einsum("l,eln->en", rule.weights, slopes)
-    return _Points(
-        rows=jnp.concatenate(flat, axis=1),
-        ends=jnp.concatenate([nodes[0], nodes[-1], scalars]),
-        u=(mesh[:-1, None] + widths[:, None] * rule.points).ravel(),
-        scalars=scalars,
-        continuity=continuity.ravel(),
-        weights=(widths[:, None] * rule.weights).ravel(),
-    )
+    targets: Traced
 
 
 def _split_row(system: AbstractSystem, v: Traced) -> tuple[Traced, Traced, Traced, Traced]:
@@ -54,145 +48,120 @@ def _split_row(system: AbstractSystem, v: Traced) -> tuple[Traced, Traced, Trace
     return v[:n], v[n : n + n_a], v[n + n_a : 2 * n + n_a], v[2 * n + n_a :]
 
 
-def _point_rows(
-    system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, u: Traced, p: Traced
-) -> Traced:
+def _split_ends(system: AbstractSystem, v: Traced) -> tuple[Traced, Traced, Traced]:
+    """(y(0), y(1), scalars)."""
+    n = len(system.fields)
+    return v[:n], v[n : 2 * n], v[2 * n :]
+
+
+def _at_point(system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, u: Traced, p: Traced) -> Traced:
     """Equations and integrands at one point as a function of its row v."""
     dy, a, y, s = _split_row(system, v)
     dq = coefficient * system.stored(y, s) + history
     return jnp.concatenate([system.equations(dy, y, a, s, dq, u, p), system.integrands(dy, y, a, s, u, p)])
 
 
-def _end_rows(system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, p: Traced) -> Traced:
-    """End conditions as a function of (y(0), y(1), scalars)."""
-    n = len(system.fields)
-    y0, y1, s = v[:n], v[n : 2 * n], v[2 * n :]
-    dq0 = coefficient * system.stored(y0, s) + history[0]
-    dq1 = coefficient * system.stored(y1, s) + history[1]
+def _at_ends(system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, p: Traced) -> Traced:
+    """End conditions."""
+    y0, y1, s = _split_ends(system, v)
+    dq0, dq1 = (coefficient * system.stored(y, s) + q for y, q in ((y0, history[0]), (y1, history[1])))
     return system.end_conditions(y0, y1, s, dq0, dq1, p)
 
 
-def _assemble(system: AbstractSystem, points: _Points, rows: Traced, ends: Traced, p: Traced) -> Traced:
-    """The flat residual: equations, continuity, end conditions, integral conditions."""
-    n_rows = len(system.fields) + len(system.algebraic)
-    integrals = points.weights @ rows[:, n_rows:] - system.targets(points.scalars, p)
-    return jnp.concatenate([rows[:, :n_rows].ravel(), points.continuity, ends, integrals])
-
-
-def _residual(
-    system: AbstractSystem, k: int, mesh: Traced, x: Traced, history: Traced, coefficient: Traced, p: Traced
-) -> Traced:
-    points = _points(system, k, mesh, x)
-    history = history.reshape(points.rows.shape[0] + 2, -1)
-    rows = jax.vmap(lambda v, q, u: _point_rows(system, v, q, coefficient, u, p))(points.rows, history[:-2], points.u)
-    return _assemble(system, points, rows, _end_rows(system, points.ends, history[-2:], coefficient, p), p)
-
-
-def _linearised(
-    system: AbstractSystem, k: int, mesh: Traced, x: Traced, history: Traced, coefficient: Traced, p: Traced
-) -> tuple[Traced, Traced, Traced, Traced]:
-    """The flat residual, and the Jacobian by blocks: points (rows, columns, k, N), ends, targets."""
-    points = _points(system, k, mesh, x)
-    history = history.reshape(points.rows.shape[0] + 2, -1)
-
-    def rows(v: Traced, q: Traced, u: Traced) -> tuple[Traced, Traced]:
-        value = _point_rows(system, v, q, coefficient, u, p)
-        return value, value
-
-    def ends(v: Traced) -> Traced:
-        return _end_rows(system, v, history[-2:], coefficient, p)
-
-    # Points run along the last axis, in the order (stage, element), which is what the elimination vectorises over.
-    jacobian, value = jax.vmap(jax.jacfwd(rows, has_aux=True), out_axes=(-1, 0))(points.rows, history[:-2], points.u)
-    jacobian = jacobian.reshape(*jacobian.shape[:2], mesh.shape[0] - 1, k).swapaxes(2, 3)
-    flat = _assemble(system, points, value, ends(points.ends), p)
-    return flat, jacobian, jax.jacfwd(ends)(points.ends), jax.jacfwd(lambda s: system.targets(s, p))(points.scalars)
-
-
-def _integrals(
-    system: AbstractSystem, k: int, density: Density, mesh: Traced, x: Traced, history: Traced, c: Traced, p: Traced
-) -> tuple[dict[str, Traced], dict[str, Traced]]:
-    """Integrals of named densities, and their largest values among the Gauss points."""
-    points = _points(system, k, mesh, x)
-    history = history.reshape(points.rows.shape[0] + 2, -1)
-
-    def at(v: Traced, q: Traced) -> dict[str, Traced]:
-        dy, a, y, s = _split_row(system, v)
-        return density(system, dy, y, a, s, c * system.stored(y, s) + q, p)
-
-    values = jax.vmap(at)(points.rows, history[:-2])
-    return {name: points.weights @ f for name, f in values.items()}, {name: f.max() for name, f in values.items()}
-
-
-def _stored(system: AbstractSystem, k: int, mesh: Traced, x: Traced) -> Traced:
-    """q at the points and at both ends, flat."""
-    points, n = _points(system, k, mesh, x), len(system.fields)
+def _stored(system: AbstractSystem, rows: Traced, ends: Traced) -> tuple[Traced, Traced]:
+    """q at the points (T, n_q) and at both ends (2, n_q)."""
 
     def at(v: Traced) -> Traced:
         _, _, y, s = _split_row(system, v)
         return system.stored(y, s)
 
-    ends = points.ends
-    at_ends = [system.stored(ends[:n], ends[2 * n :]), system.stored(ends[n : 2 * n], ends[2 * n :])]
-    return jnp.concatenate([jax.vmap(at)(points.rows), jnp.stack(at_ends)]).ravel()
+    y0, y1, s = _split_ends(system, ends)
+    return jax.vmap(at)(rows), jnp.stack([system.stored(y0, s), system.stored(y1, s)])
 
 
-def _derivative(system: AbstractSystem, k: int, mesh: Traced, x: Traced, p: Traced, dx: Traced, dp: Traced) -> Traced:
-    """d(residual at rest) along (dx, dp)."""
-    rest = jnp.zeros_like(_stored(system, k, mesh, x))
-
-    def at_rest(x: Traced, p: Traced) -> Traced:
-        return _residual(system, k, mesh, x, rest, jnp.zeros(()), p)
-
-    return jax.jvp(at_rest, (x, p), (dx, dp))[1]
+def _values(system: AbstractSystem, tile: Tile, coefficient: Traced, p: Traced) -> Values:
+    rows = jax.vmap(lambda v, q, u: _at_point(system, v, q, coefficient, u, p))(tile.rows, tile.history, tile.u)
+    ends = _at_ends(system, tile.ends, tile.end_history, coefficient, p)
+    return Values(rows, ends, system.targets(_split_ends(system, tile.ends)[2], p))
 
 
-def _second_derivative(
-    system: AbstractSystem,
-    k: int,
-    mesh: Traced,
-    x: Traced,
-    p: Traced,
-    one: Traced,
-    dp: Traced,
-    other: Traced,
-    ep: Traced,
-) -> Traced:
-    """The second derivative of the residual at rest along (one, dp) and (other, ep)."""
-    return jax.jvp(lambda x, p: _derivative(system, k, mesh, x, p, one, dp), (x, p), (other, ep))[1]
+def _linearised(system: AbstractSystem, tile: Tile, coefficient: Traced, p: Traced) -> tuple[Values, Values]:
+    """Values, and their Jacobians over the row, the ends, the scalars: rows (m + n_i, columns, T), ends, targets."""
+
+    def at(v: Traced, q: Traced, u: Traced) -> tuple[Traced, Traced]:
+        value = _at_point(system, v, q, coefficient, u, p)
+        return value, value
+
+    # Points run along the last axis, which is what the elimination vectorises over.
+    slopes, rows = jax.vmap(jax.jacfwd(at, has_aux=True), out_axes=(-1, 0))(tile.rows, tile.history, tile.u)
+    ends = jax.jacfwd(lambda v: _at_ends(system, v, tile.end_history, coefficient, p))(tile.ends)
+    scalars = _split_ends(system, tile.ends)[2]
+    values = Values(rows, _at_ends(system, tile.ends, tile.end_history, coefficient, p), system.targets(scalars, p))
+    return values, Values(slopes, ends, jax.jacfwd(lambda s: system.targets(s, p))(scalars))
 
 
-def _mass(system: AbstractSystem, k: int, mesh: Traced, x: Traced, p: Traced, dx: Traced) -> Traced:
-    """d(residual)/d(dq/dt) dq/dx dx at rest."""
-    stored, rates = jax.jvp(lambda x: _stored(system, k, mesh, x), (x,), (dx,))
+def _at_rest(system: AbstractSystem, u: Traced, rows: Traced, ends: Traced, p: Traced) -> Values:
+    history, end_history = (jnp.zeros_like(q) for q in _stored(system, rows, ends))
+    return _values(system, Tile(rows, history, u, ends, end_history), jnp.zeros(()), p)
 
-    def in_motion(history: Traced) -> Traced:
-        return _residual(system, k, mesh, x, history, jnp.zeros(()), p)
 
-    return jax.jvp(in_motion, (jnp.zeros_like(stored),), (rates,))[1]
+Increment = tuple[Traced, Traced, Traced]
+"""(rows, ends, p)."""
+
+
+def _derivative(system: AbstractSystem, u: Traced, at: Increment, along: Increment) -> Values:
+    """The derivative of the values at rest."""
+    return jax.jvp(partial(_at_rest, system, u), at, along)[1]
+
+
+def _second_derivative(system: AbstractSystem, u: Traced, at: Increment, one: Increment, other: Increment) -> Values:
+    """The second derivative of the values at rest."""
+    return jax.jvp(lambda *at: _derivative(system, u, at, one), at, other)[1]
+
+
+def _mass(system: AbstractSystem, u: Traced, at: Increment, rows: Traced, ends: Traced) -> Values:
+    """d(values)/d(dq/dt) dq at rest, dq being the change of q along (rows, ends)."""
+    q, dq = jax.jvp(partial(_stored, system), at[:2], (rows, ends))
+
+    def moving(history: Traced, end_history: Traced) -> Values:
+        return _values(system, Tile(at[0], history, u, at[1], end_history), jnp.zeros(()), at[2])
+
+    return jax.jvp(moving, (jnp.zeros_like(q[0]), jnp.zeros_like(q[1])), dq)[1]
+
+
+def _densities(
+    system: AbstractSystem, density: Density, rows: Traced, history: Traced, coefficient: Traced, p: Traced
+) -> dict[str, Traced]:
+    """Named densities (T,)."""
+
+    def at(v: Traced, q: Traced) -> dict[str, Traced]:
+        dy, a, y, s = _split_row(system, v)
+        return density(system, dy, y, a, s, coefficient * system.stored(y, s) + q, p)
+
+    return jax.vmap(at)(rows, history)
 
 
 class Functions(NamedTuple):
-    """The functions above, compiled for one system and degree; they compile again for each number of elements."""
+    """The functions above, compiled for one system; they compile again for each of the TILES."""
 
-    residual: Callable[..., Traced]
-    linearised: Callable[..., tuple[Traced, ...]]
-    integrals: Callable[..., tuple[dict[str, Traced], dict[str, Traced]]]
-    stored: Callable[..., Traced]
-    derivative: Callable[..., Traced]
-    second_derivative: Callable[..., Traced]
-    mass: Callable[..., Traced]
+    values: Callable[..., Values]
+    linearised: Callable[..., tuple[Values, Values]]
+    stored: Callable[..., tuple[Traced, Traced]]
+    derivative: Callable[..., Values]
+    second_derivative: Callable[..., Values]
+    mass: Callable[..., Values]
+    densities: Callable[..., dict[str, Traced]]
 
 
 @cache
-def compiled_functions(system: AbstractSystem, k: int) -> Functions:
+def compiled_functions(system: AbstractSystem) -> Functions:
     """Compiled functions of arrays only: looking up a system at each call would cost more than small evaluations."""
     return Functions(
-        residual=jax.jit(partial(_residual, system, k)),
-        linearised=jax.jit(partial(_linearised, system, k)),
-        integrals=jax.jit(partial(_integrals, system, k), static_argnums=0),
-        stored=jax.jit(partial(_stored, system, k)),
-        derivative=jax.jit(partial(_derivative, system, k)),
-        second_derivative=jax.jit(partial(_second_derivative, system, k)),
-        mass=jax.jit(partial(_mass, system, k)),
+        values=jax.jit(partial(_values, system)),
+        linearised=jax.jit(partial(_linearised, system)),
+        stored=jax.jit(partial(_stored, system)),
+        derivative=jax.jit(partial(_derivative, system)),
+        second_derivative=jax.jit(partial(_second_derivative, system)),
+        mass=jax.jit(partial(_mass, system)),
+        densities=jax.jit(partial(_densities, system), static_argnums=0),
     )
