@@ -45,12 +45,13 @@ clean: ## remove .venv and caches (results stay)
 # The stamp goes away before anything is touched and comes back only when all is done. Without it .venv is made anew, since an
 # install that was cut off may leave half a package that pip takes for a whole one. With a stamp that is merely older than the
 # two files below, .venv was whole, and pip changes what differs. The variables pin the build back end too, which pip installs
-# in an environment of its own: old releases of pip read the first one, new ones the second. Modules are compiled when they are
-# first imported, since most of them never are.
+# in an environment of its own: old releases of pip read the first one, new ones the second. Of the modules only those that the
+# program imports are compiled, here and also where the user's environment forbids it later: it would cost seconds each time.
 $(STAMP): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit("shapespace needs Python 3.11 or newer: make PYTHON=<path of one> ..." if sys.version_info < (3, 11) else 0)'
 	@if [ -f $@ ]; then rm $@; else $(PYTHON) -m venv --clear .venv; fi
 	@echo "Installing the pinned dependencies into .venv (a few minutes the first time) ..."
 	@PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt \
 	  $(BIN)/python -m pip install --quiet --quiet --no-compile --disable-pip-version-check -c constraints.txt -e '.[movie,dev]'
+	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -c 'import shapespace.cli, shapespace.study.simulation, shapespace.study.dataset, shapespace.view.movie'
 	@touch $@

@@ -24,9 +24,12 @@ LAYERS = {"boundary": BoundaryLayer(), "interior": InteriorLayer()}
 
 
 def adapted(name: str, e: float, tolerance: float) -> tuple[CollocationProblem, Array, int]:
-    """A layer solved on a mesh that follows it, from 20 equal elements on; and the number of meshes it took."""
+    """A layer solved on a mesh that follows it, from 20 equal elements on; and the number of meshes it took.
+
+    About ten; while the layer is unresolved, round-off decides which meshes come next.
+    """
     mesh = uniform_mesh(20)
-    for count in range(1, 12):
+    for count in range(1, 21):
         problem, x = solve_layer(LAYERS[name], mesh, 4, e, tolerance)
         better = problem.adapted(x)
         if better is problem:
