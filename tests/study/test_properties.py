@@ -91,9 +91,6 @@ def check_reflected(one: Frame, other: Frame, tolerance: float) -> None:
     assert max(misses.values()) < tolerance, f"t = {one.time:.3g}: {misses}"
 
 
-@pytest.mark.xfail(
-    reason="alpha(0) = 0 is imposed at one pole; at the other it holds up to the error in space only", strict=False
-)
 @pytest.mark.parametrize("name", ["polar-swimmer", "ring-slipping"])
 @settings(SLOW, max_examples=4)
 @given(seed=st.floats(-0.5, 0.5), curvature=st.floats(-1.0, 1.0))

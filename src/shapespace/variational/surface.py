@@ -55,8 +55,7 @@ class SurfaceSystem(AbstractSystem):
         """Closed surfaces: the mirror z -> -z, which exchanges the poles, where both have conditions of the same kind.
 
         The density R is even. So of a field with sign s, its rate has s, its slope -s, and the flux P_w = dR/dw' conjugate to
-        it again -s, as the species flux has. alpha(0) = 0 is kept because alpha vanishes at both poles of a solution: the
-        mesh may be shifted along the meridian at no cost (its first integral is zero).
+        it again -s, as the species flux has. The gauge alpha(0) = alpha(1) is its own image.
         """
         is_mirrored = all(type(start) is type(stop) for _, start, stop in self.ends)
         if "v0" not in self.scalars or "area" in self.fields or not is_mirrored:
@@ -167,12 +166,13 @@ class SurfaceSystem(AbstractSystem):
         return self.variation(dy, y, tension[None], s, dq, p).flux.meridional_velocity
 
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:
-        """One row per end of each rate, the gauge alpha(0) = 0, the frame z(0) + z(1) = 0, the origin a(0) = 0."""
+        """One row per end of each rate, the gauge alpha(0) = 0 (closed: = alpha(1)), the frame z(0) + z(1) = 0, a(0) = 0."""
         f0, f1, scalar = self.field_values(y0), self.field_values(y1), self.scalar_values(s)
         rows = []
         for name, start, stop in self.ends:
             rows += [self._end(name, start, y0, s, dq0, p), self._end(name, stop, y1, s, dq1, p)]
-        rows.append(f0["alpha"])
+        # Of two poles neither is preferred: alpha(0) + alpha(1) = 0 follows from the equations, so both vanish.
+        rows.append(f0["alpha"] - f1["alpha"] if "v0" in scalar else f0["alpha"])
         if "v0" in scalar:
             rows.append(f0["z"] + f1["z"])
             # Without friction a translation meets no force: beta(1) = 0 then repeats beta(0) = 0, and v0 = 0 by choice.
