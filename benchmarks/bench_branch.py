@@ -1,0 +1,170 @@
+"""A branch of stationary surfaces beside AUTO-07p: guided division at Pe = 450 (Fig. 7b), ring amplitude 0 to 4.2.
+
+Both start from the sphere on 60 elements of 4 Gauss points with the mesh moved along, and locate the folds. They differ in
+what they do besides: ours refines to a tolerance and locates the branch points too; AUTO keeps 60 intervals and
+looks for none (peer_auto.py says why). Then ours with the leading growth rates at every point, which AUTO does not
+offer for boundary value problems, and 100 points of Bratu's problem.
+
+Times are processor time on one core, everything compiled, the better of two.
+Run from the root: python -m benchmarks.bench_branch   (about two minutes)
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import NamedTuple
+
+from benchmarks.timing import machine, use_one_core
+
+use_one_core()
+
+import time  # noqa: E402  (threads are set before the libraries load)
+
+import numpy as np  # noqa: E402
+from benchmarks.peer_auto import MISSING, STEPS, auto_directory, run_auto  # noqa: E402
+from tests.classic import at_rest, bratu  # noqa: E402
+
+from shapespace.analysis.bifurcation import Kind, SingularPoint  # noqa: E402
+from shapespace.analysis.branch import Point  # noqa: E402
+from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point  # noqa: E402
+from shapespace.analysis.extended import Parameter  # noqa: E402
+from shapespace.analysis.stability import Spectrum, solve_spectrum  # noqa: E402
+from shapespace.analysis.stationary import solve_stationary  # noqa: E402
+from shapespace.analysis.tracing import Located, traced  # noqa: E402
+from shapespace.base.arrays import Array  # noqa: E402
+from shapespace.base.problem import AbstractSmoothProblem  # noqa: E402
+from shapespace.study.engine import Engine  # noqa: E402
+from shapespace.study.keyed import KeyedProblem  # noqa: E402
+from shapespace.study.scenario import scenario  # noqa: E402
+
+KEY, END = "ring_amplitude", 4.2
+BRATU_FOLD = 3.513830719125161
+"""Exact; tests/classic.py."""
+
+
+class Branch(NamedTuple):
+    """points: all of them, the start included; n_failed: spectra that did not converge; outcome: why the branch ended."""
+
+    points: list[Point]
+    located: list[SingularPoint]
+    n_missed: int
+    n_failed: int
+    outcome: str
+
+    @property
+    def folds(self) -> list[tuple[float, float]]:
+        """(parameter, its estimated error) of the folds in the order met."""
+        return [(point.parameter, point.parameter_error) for point in self.located if point.kind is Kind.FOLD]
+
+
+def followed(
+    problem: AbstractSmoothProblem,
+    x: Array,
+    options: Arclength,
+    *stops: Stop,
+    locate: bool = True,
+    spectra: bool = False,
+) -> Branch:
+    """The branch from the state near x at parameter 0, with its singular points and its growth rates if wanted."""
+    found = solve_stationary(problem, x, np.zeros(1))
+    start = start_point(found.problem, found.x, found.p, 0, options=options)
+    assert isinstance(start, Point)
+    branch = Continuation([start], stops, options)
+    met = [start, *(traced(branch) if locate else branch)]
+    points = [one for one in met if isinstance(one, Point)]
+    n_failed = _failed_spectra(points) if spectra else 0
+    located = [one.point for one in met if isinstance(one, Located)]
+    n_missed = len(met) - len(points) - len(located)
+    return Branch(points, located, n_missed, n_failed, str(branch.outcome))
+
+
+def _failed_spectra(points: Sequence[Point]) -> int:
+    """Solve for the leading growth rates of each point, helped by those of the one before; how many did not converge."""
+    near: Spectrum | None = None
+    n_failed = 0
+    for point in points:
+        assert isinstance(point.problem, AbstractSmoothProblem)
+        near = solve_spectrum(point.problem, point.x, point.p, near=near)
+        n_failed += not near.converged
+    return n_failed
+
+
+def guided_division(locate: bool = True, spectra: bool = False) -> Branch:
+    """Ours from the sphere to the end."""
+    base = scenario("guided-division", elements=60, degree=4, initial_ring_amplitude=0.0)
+    engine, problem = Engine.of(base.with_overrides({KEY: 0.0})), KeyedProblem.of(base, (KEY,))
+    x = problem.base.pack(engine.initial_state())
+    options = Arclength(first=0.05, parameter_scale=END)
+    return followed(problem, x, options, Stop(Parameter(0), END, "end", True), locate=locate, spectra=spectra)
+
+
+def bratu_branch() -> Branch:
+    """100 points from y = 0 over the fold, in steps short enough to end on the upper branch before lambda = 0."""
+    problem = bratu()
+    return followed(problem, at_rest(problem), Arclength(first=0.05, largest=0.05, max_points=99))
+
+
+def timed(work: Callable[[], Branch]) -> tuple[Branch, float]:
+    """A branch and the better of two processor times, when everything is compiled."""
+    made, seconds = work(), []
+    for _ in range(2):
+        start = time.process_time()
+        made = work()
+        seconds.append(time.process_time() - start)
+    return made, min(seconds)
+
+
+def line(name: str, points: int, seconds: float) -> str:
+    """One row of the table."""
+    return f"{name:34s} {points:4d} points  {seconds:6.2f} s  {1e3 * seconds / points:6.1f} ms a point"
+
+
+def print_ours() -> tuple[Branch, float]:
+    """Print our branch: with its singular points, without, and with growth rates as well."""
+    made, seconds = timed(guided_division)
+    print(line("ours", len(made.points), seconds), f" ends: {made.outcome}")
+    for fold, error in made.folds:
+        print(f"    fold {fold:.9f}, estimated error {error:.0e}")
+    sizes = [point.problem.base.elements for point in made.points if isinstance(point.problem, KeyedProblem)]
+    others = len(made.located) - len(made.folds)
+    print(f"    also located: {others} branch points; missed: {made.n_missed}; elements <= {max(sizes)}")
+    bare, seconds_bare = timed(partial(guided_division, locate=False))
+    print(line("ours, nothing located", len(bare.points), seconds_bare))
+    full, seconds_full = timed(partial(guided_division, spectra=True))
+    print(line("ours, with leading growth rates", len(full.points), seconds_full), f" failed: {full.n_failed}")
+    return made, seconds
+
+
+def print_auto(ours: Branch, seconds: float) -> None:
+    """Print AUTO's branch beside ours, or that it is not here."""
+    directory = auto_directory()
+    if directory is None:
+        print(MISSING)
+        return
+    last = ours.points[-1]
+    assert isinstance(last.problem, KeyedProblem)
+    mine = np.array([last.parameter, *last.problem.base.unpack(last.x).scalars[:2]])
+    for step in STEPS:
+        run = min((run_auto(directory, step) for _ in range(2)), key=lambda run: run.seconds)
+        print(line(f"AUTO-07p, DSMAX {step}", run.points, run.seconds))
+        ratio = (len(ours.points) / seconds) / (run.points / run.seconds)
+        print(
+            f"    points per second, ours to AUTO's: {ratio:.2f}; whole branches per second: {run.seconds / seconds:.2f}"
+        )
+        for theirs, (fold, _) in zip(run.folds, ours.folds, strict=True):
+            print(f"    fold {theirs:.9f}, AUTO's less ours {theirs - fold:+.1e}")
+        print(f"    end: relative differences of (Delta_c, h, p) {np.abs(np.array(run.end) / mine - 1.0)}")
+
+
+def main() -> None:
+    """Print the table."""
+    print(machine())
+    ours, seconds = print_ours()
+    print_auto(ours, seconds)
+    made, seconds = timed(bratu_branch)
+    ((fold, error),) = made.folds
+    print(line("Bratu, 20 elements", len(made.points), seconds))
+    print(f"    fold {fold:.12f}, estimated error {error:.0e}, error {abs(fold - BRATU_FOLD):.0e}")
+
+
+if __name__ == "__main__":
+    main()
