@@ -168,6 +168,16 @@ class SingularProblem(AbstractContinuableProblem):
             rows.append(self.gradient(kernel, x, p, vector[:n], dp))
         return np.stack(rows, axis=1)
 
+    def adapted(self, x: Array) -> "SingularProblem":
+        """On the discretisation that the base asks for at the state, with the kernel carried there."""
+        better = self.base.adapted(self.state(x))
+        if better is self.base:
+            return self
+        assert isinstance(better, AbstractSmoothProblem)
+        n = len(self.state(x))
+        kernel = [np.append(self.base.carried(v[:n], better), v[n:]) for v in self.kernel]
+        return replace(self, base=better, kernel=np.stack(kernel))
+
     def carried(self, x: Array, other: AbstractProblem) -> Array:
         """The state carried, the scalars kept."""
         assert isinstance(other, SingularProblem)
