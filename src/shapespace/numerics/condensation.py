@@ -207,17 +207,21 @@ def determinant_sign(factors: Factors) -> float:
     """Sign of the determinant of the whole matrix, up to a factor that depends on N, k and the numbers of rows only."""
     f, size = factors, len(factors.plan.position)
     elements, m, n = len(f.widths), len(f.plan.partner), f.chain_pivot.shape[1]
-    alone = np.setdiff1d(np.arange(elements), f.local.pivoted)
-    signs = [
-        np.sign(f.local.work[:size, alone]),
-        np.sign(np.diagonal(f.local.dense[:, :size, :size], axis1=1, axis2=2)),
-        np.sign(np.diagonal(f.chain[:, :n, :n], axis1=1, axis2=2)),
-        np.sign(np.diagonal(f.border_lu)),
+    pivots = [
+        f.local.dense[:, :size, :size].diagonal(axis1=1, axis2=2),
+        f.chain[:, :n, :n].diagonal(axis1=1, axis2=2),
+        f.border_lu.diagonal(),
     ]
-    exchanges = [f.local.exchanges, f.chain_pivot, f.border_pivot]
-    odd = sum(int((e != np.arange(e.shape[-1])).sum()) for e in exchanges)
-    matching = np.linalg.det(np.eye(m)[f.plan.partner]) ** (size // m * elements)
-    return float(np.prod([part.prod() for part in signs]) * (-1.0) ** odd * np.round(matching))
+    stages = f.local.work[:size]
+    odd = np.count_nonzero(stages < 0.0) - np.count_nonzero(stages[:, f.local.pivoted] < 0.0)
+    odd += sum(np.count_nonzero(part < 0.0) for part in pivots)
+    odd += sum(
+        np.count_nonzero(e != np.arange(e.shape[-1])) for e in (f.local.exchanges, f.chain_pivot, f.border_pivot)
+    )
+    matching = sum(np.count_nonzero(f.plan.partner[:i] > f.plan.partner[i]) for i in range(m))
+    odd += matching * (size // m * elements)
+    regular = not f.singular and all((part != 0.0).all() for part in pivots)
+    return (-1.0) ** (odd % 2) if regular else 0.0
 
 
 @compiled
