@@ -36,7 +36,7 @@ format: $(STAMP) ## rewrite the sources in the common format and mend what lint 
 	$(BIN)/ruff check --fix $(SOURCES)
 
 bench: $(STAMP) ## run the benchmarks, one after the other
-	@set -e; for file in benchmarks/bench_*.py; do echo "== $$file"; $(BIN)/python "$$file"; done
+	@set -e; for file in benchmarks/bench_*.py; do echo "== $$file"; PYTHONPATH=. $(BIN)/python "$$file"; done
 
 clean: ## remove .venv and caches (results stay)
 	rm -rf .venv build dist .pytest_cache .ruff_cache .mypy_cache .hypothesis

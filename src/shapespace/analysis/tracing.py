@@ -13,9 +13,6 @@ from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractSmoothProblem
 
-SAME_PLACE = 1e-6
-"""A fold and a branch point whose parameters differ by less than this, relative to it (or one), are one pitchfork."""
-
 
 @dataclass(frozen=True)
 class Located:
@@ -48,18 +45,13 @@ def singular_points(before: Point, after: Point) -> list[Located | Missed]:
     for bracket in sorted(brackets(before, after), key=lambda bracket: bracket.kind):
         if bracket.kind == "fold" and any(isinstance(one, Located) and _turns(one.point) for one in found):
             continue
-        located = _located(bracket)
-        found.append(_or_pitchfork(located) if isinstance(located, Located) and bracket.kind == "fold" else located)
+        found.append(_located(bracket))
     return found
 
 
 def _turns(point: SingularPoint) -> bool:
     """Whether the parameter turns on one of the branches through a point."""
     return point.kind is Kind.PITCHFORK
-
-
-def _same_place(one: SingularPoint, other: SingularPoint) -> bool:
-    return abs(one.parameter - other.parameter) <= SAME_PLACE * max(abs(one.parameter), 1.0)
 
 
 def _located(bracket: Bracket) -> Located | Missed:
@@ -69,8 +61,13 @@ def _located(bracket: Bracket) -> Located | Missed:
     X, tangent = between(bracket)
     p = bracket.after.p.copy()
     p[bracket.after.index] = X[-1]
-    locate = locate_fold if bracket.kind == "fold" else locate_branch_point
-    point = locate(problem, bracket.after.index, X[:-1], p, tangent[:-1] if bracket.kind == "fold" else tangent)
+    index, x = bracket.after.index, X[:-1]
+    point: SingularPoint | Outcome = Outcome.DIVERGED
+    if bracket.kind == "fold":
+        point = locate_fold(problem, index, x, p, tangent[:-1])
+    if isinstance(point, Outcome):
+        # Where the parameter turns at a pitchfork, F_p lies in the range of F_x, and a fold's defining system is singular.
+        point = locate_branch_point(problem, index, x, p, tangent)
     if isinstance(point, Outcome):
         return Missed(bracket, point)
     return Located(point, bracket) if _is_inside(bracket, point) else Missed(bracket, Outcome.DIVERGED)
@@ -84,19 +81,6 @@ def _is_inside(bracket: Bracket, point: SingularPoint) -> bool:
     ends = [bracket.before.on(problem).joined, bracket.after.joined]
     distance = max(float(np.sqrt(weights @ (there - end) ** 2)) for end in ends)
     return distance <= 1.5 * (bracket.after.arclength - bracket.before.arclength)
-
-
-def _or_pitchfork(fold: Located) -> Located:
-    """A turn of the parameter where a second branch passes is a pitchfork: there F_p lies in the range of F_x as well."""
-    point = fold.point
-    kernel = np.append(point.kernel[0], 0.0)
-    other = locate_branch_point(point.problem, point.index, point.x, point.p, kernel)
-    is_same = isinstance(other, SingularPoint) and _same_place(point, other) and _is_near(point, other)
-    return Located(other, fold.bracket) if is_same and isinstance(other, SingularPoint) else fold
-
-
-def _is_near(one: SingularPoint, other: SingularPoint) -> bool:
-    return one.problem.norm(other.x - one.x, one.x) <= np.sqrt(SAME_PLACE)
 
 
 def between(bracket: Bracket) -> tuple[Array, Array]:
