@@ -213,7 +213,7 @@ def test_file_keeps_its_budgets(path: Path):
 
 @pytest.mark.parametrize("path", python_files("src"), ids=lambda path: str(path.relative_to(ROOT)))
 def test_library_does_not_print(path: Path):
-    if path != SOURCE / PACKAGE / "cli.py":
+    if SOURCE / PACKAGE / "cli" not in path.parents:
         assert not printing_lines(ast.parse(path.read_text(encoding="utf-8")))
 
 

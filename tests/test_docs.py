@@ -99,7 +99,17 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
         return
     assert program == "shapespace", f"{page}: {command}"
     function, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
-    assert function.__name__ in {"list_scenarios", "config", "run_command", "plot", "movie", "export", "check"}
+    assert function.__name__ in {
+        "list_scenarios",
+        "config",
+        "run_command",
+        "steady_command",
+        "branch_command",
+        "plot",
+        "movie",
+        "export",
+        "check",
+    }
     if function.__name__ == "run_command":
         name, changes = bound.args[0], dict(text.split("=") for text in bound.kwargs.get("settings", ()))
         if name.endswith(".toml"):

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from shapespace.base.errors import InputError as InputError
     from shapespace.base.errors import StoreError as StoreError
     from shapespace.base.outcome import Outcome as Outcome
+    from shapespace.study.branch_store import Branch as Branch
+    from shapespace.study.branch_store import open_branch as open_branch
+    from shapespace.study.branching import branch as branch
     from shapespace.study.dataset import open_dataset as open_dataset
     from shapespace.study.run import Run as Run
     from shapespace.study.run import run as run
@@ -21,6 +24,8 @@ if TYPE_CHECKING:
     from shapespace.study.scenario import load_scenario as load_scenario
     from shapespace.study.scenario import scenario as scenario
     from shapespace.study.scenario import scenario_names as scenario_names
+    from shapespace.study.steady import Steady as Steady
+    from shapespace.study.steady import steady as steady
     from shapespace.view.show import movie as movie
     from shapespace.view.show import plot as plot
 
@@ -30,6 +35,9 @@ _HOMES = {
     "InputError": "base.errors",
     "StoreError": "base.errors",
     "Outcome": "base.outcome",
+    "Branch": "study.branch_store",
+    "open_branch": "study.branch_store",
+    "branch": "study.branching",
     "open_dataset": "study.dataset",
     "Run": "study.run",
     "run": "study.run",
@@ -37,6 +45,8 @@ _HOMES = {
     "load_scenario": "study.scenario",
     "scenario": "study.scenario",
     "scenario_names": "study.scenario",
+    "Steady": "study.steady",
+    "steady": "study.steady",
     "movie": "view.show",
     "plot": "view.show",
 }

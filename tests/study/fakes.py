@@ -42,7 +42,8 @@ class FakeSimulation:
     observables: dict[str, float] = {}  # noqa: RUF012  # replaced as a whole, never changed
     starts: list[tuple[Scenario, list[float]]] = []  # noqa: RUF012  # cleared for each test by `install`
 
-    def __init__(self, scenario: Scenario, history: Sequence[Frame] = ()) -> None:
+    def __init__(self, scenario: Scenario, history: Sequence[Frame] = (), start: Frame | None = None) -> None:
+        del start
         self.scenario = scenario
         self.history = history
         self.outcome: Outcome | None = None

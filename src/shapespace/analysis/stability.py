@@ -123,7 +123,7 @@ def solve_spectrum(
     search = _Search(problem, x, p, options, rest)
     shift = near.next_shift if near is not None and near.converged else search.first_shift()
     last = None
-    for attempt in range(options.max_attempts):
+    for attempt in range(options.max_attempts if np.isfinite(shift) else 0):
         pairs, shift = search.pairs_from(shift, attempt)
         if pairs is None:
             continue
@@ -163,10 +163,15 @@ class _Search:
         return pencil
 
     def first_shift(self) -> float:
-        """To the right of the largest rates, found from so far to their right that they stand out."""
+        """To the right of the largest rates, found from so far to their right that they stand out.
+
+        Infinite where no rate is finite: a flat disc's deflections dissipate nothing to first order.
+        """
         far = FAR
         while True:
             krylov = Krylov(self.pencil(far), PROBE, seed=0)
+            if _is_rateless(krylov):
+                return np.inf
             krylov.extend(PROBE)
             self.applications += krylov.applications
             shift = _shift_by(krylov.ritz())
@@ -178,6 +183,8 @@ class _Search:
         """Verified pairs if the disc around this shift could be made large enough, and the shift to try otherwise."""
         count, most = self.options.count, self.options.max_dimension
         krylov = Krylov(self.pencil(shift), most, attempt)
+        if _is_rateless(krylov):
+            return None, 2.0 * shift
         shift, dimension = krylov.pencil.shift, 4 * count
         while True:
             krylov.extend(dimension)
@@ -260,6 +267,11 @@ class _Search:
             applications=self.applications,
             factorisations=self.factorisations,
         )
+
+
+def _is_rateless(krylov: Krylov) -> bool:
+    """Whether a space is empty before anything was applied to its start: no finite rates are there."""
+    return krylov.is_invariant and krylov.dimension == 0
 
 
 def _leading(rates: ComplexArray, count: int) -> list[int]:

@@ -14,7 +14,7 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.scales import QUANTITIES
 from shapespace.models.open_membrane import local_spontaneous_curvature
 from shapespace.numerics.state import State
-from shapespace.study.engine import Engine
+from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.scenario import Scenario
 from shapespace.study.store import RunStore
@@ -99,7 +99,7 @@ def _travelled(times: Array, speeds: Array) -> Array:
 def _fields(engine: Engine, frame: Frame) -> dict[str, Array]:
     """Dimensionless fields (point,) of one frame, sampled evenly over its elements."""
     system = engine.system
-    state = State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)
+    state = state_of(frame)
     u = np.interp(np.linspace(0.0, len(frame.mesh) - 1.0, POINTS), np.arange(len(frame.mesh)), frame.mesh)
     y = dict(zip(system.fields, state.values(u).T, strict=True))
     dpsi = state.derivatives(u)[:, system.fields.index("psi")]

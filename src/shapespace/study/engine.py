@@ -11,6 +11,7 @@ from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.state import State, state_from_functions
+from shapespace.study.frame import Frame
 from shapespace.study.scenario import Scenario
 from shapespace.variational.surface import SurfaceSystem
 
@@ -49,6 +50,22 @@ class Engine:
         mesh = uniform_mesh(numerics.elements)
         n_integrals = 1 if scenario.model == "closed-surface" else 0
         return cls(CollocationProblem(system, mesh, numerics.degree, n_integrals, numerics.mesh_tolerance), p, values)
+
+    def placed(self, state: State) -> tuple[CollocationProblem, Array]:
+        """The problem on a state's mesh and the state on it, resampled where it has another degree or fewer elements."""
+        degree, wanted = self.problem.degree, self.problem.elements
+        if wanted > len(state.widths):
+            mesh = np.interp(np.linspace(0.0, 1.0, wanted + 1), np.linspace(0.0, 1.0, len(state.mesh)), state.mesh)
+            state = state.on_mesh(mesh)
+        if degree != state.rule.degree:
+            points = state.mesh[:-1, None] + state.widths[:, None] * gauss_rule(degree).points
+            slopes, algebraic = (
+                part(points.ravel()).reshape(*points.shape, -1) for part in (state.derivatives, state.algebraic_values)
+            )
+            values = state.values(state.mesh)
+            state = state_from_functions(state.mesh, degree, values, slopes, algebraic, state.scalars)
+        problem = self.problem.on_mesh(state.mesh)
+        return problem, problem.pack(state)
 
     def initial_state(self) -> State:
         """The sphere or the flat disc at rest, with the initial concentration; multipliers are first guesses."""
@@ -93,3 +110,8 @@ class Engine:
         one = np.ones_like(u)
         slopes = {"r": radius * one, "area": radius**2 * u, "meridional_force": tension * radius * one}
         return fields, slopes, np.array([radius])
+
+
+def state_of(frame: Frame) -> State:
+    """The state that a frame holds."""
+    return State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)

@@ -4,7 +4,9 @@ import io
 import struct
 import zipfile
 import zlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,24 +47,42 @@ class Frame:
 
 def encode_frame(frame: Frame) -> bytes:
     """The bytes of a frame's file, a zip archive of arrays with the CRC of each."""
-    buffer = io.BytesIO()
-    arrays = {name: np.asarray(getattr(frame, name), dtype=_PRECISION.get(name, np.float64)) for name in _ARRAYS}
-    np.savez(
-        buffer,
-        clock=np.array([frame.time, frame.step, frame.next_step], dtype=np.float64),
-        observable_names=np.array(list(frame.observables), dtype="S"),
-        observable_values=np.array(list(frame.observables.values()), dtype=np.float64),
-        **arrays,  # type: ignore[arg-type]  # numpy's own flag is not among the names
-    )
-    return buffer.getvalue()
+    return write_arrays(arrays_of(frame))
 
 
 def decode_frame(data: bytes) -> Frame:
     """The frame in the bytes of a file; one of DAMAGE where the bytes are not what was written."""
+    return frame_of_arrays(read_arrays(data))
+
+
+def write_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """A zip archive of arrays with the CRC of each."""
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)  # type: ignore[arg-type]  # numpy's own flag is not among the names
+    return buffer.getvalue()
+
+
+def read_arrays(data: bytes) -> dict[str, NDArray[Any]]:
+    """The arrays in the bytes of an archive; one of DAMAGE where they are not what was written."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         # Reading a member whole checks its CRC before anything in it is believed.
         members = {name: io.BytesIO(archive.read(name)) for name in archive.namelist()}
-    stored = {name.removesuffix(".npy"): np.lib.format.read_array(member) for name, member in members.items()}
+    return {name.removesuffix(".npy"): np.lib.format.read_array(member) for name, member in members.items()}
+
+
+def arrays_of(frame: Frame) -> dict[str, NDArray[Any]]:
+    """What is stored of a frame, by name."""
+    arrays = {name: np.asarray(getattr(frame, name), dtype=_PRECISION.get(name, np.float64)) for name in _ARRAYS}
+    return {
+        "clock": np.array([frame.time, frame.step, frame.next_step], dtype=np.float64),
+        "observable_names": np.array(list(frame.observables), dtype="S"),
+        "observable_values": np.array(list(frame.observables.values()), dtype=np.float64),
+        **arrays,
+    }
+
+
+def frame_of_arrays(stored: Mapping[str, NDArray[Any]]) -> Frame:
+    """The frame that these arrays describe, among others."""
     arrays: dict[str, Array] = {name: stored[name] for name in _ARRAYS}
     time, step, next_step = map(float, stored["clock"])
     names = [name.decode() for name in stored["observable_names"].tolist()]

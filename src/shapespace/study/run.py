@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.frame import Frame
+from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
-from shapespace.study.store import RunStore, holds_run, is_free
+from shapespace.study.starts import Start, find_start
+from shapespace.study.store import RunStore, is_free
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,6 +58,7 @@ def run(
     *,
     out: str | Path | None = None,
     resume: bool = False,
+    start: str | Path | None = None,
     progress: Progress | None = None,
     ready: Callable[[int], None] | None = None,
 ) -> Run:
@@ -63,25 +66,37 @@ def run(
 
     `out` is the directory of the store, new or empty; without it the frames are kept in memory. With `resume` a store
     in `out` is continued; one that has already ended as asked is left as it is. InputError and StoreError before
-    anything is computed; StoreError when the disk fills up, with all frames so far intact. `ready` is called once when
-    the store is, with the number of its frames; `progress` after each new frame.
+    anything is computed; StoreError when the disk fills up, with all frames so far intact. `start` is a stored state to
+    begin with in place of the scenario's initial one: `STORE` or `STORE:LABEL`. `ready` is called once when the store is,
+    with the number of its frames; `progress` after each new frame.
     """
-    start = perf_counter()
+    began = perf_counter()
+    first = None
+    if start is not None:
+        first = find_start(start)
+        first.check_fits(scenario)
     if out is None:
         if resume:
             raise InputError("resume = True: needs the directory of a stored run; give it as out.")
         frames: list[Frame] = []
-        outcome = _simulate(scenario, [], 0, frames.append, progress)
+        outcome = _simulate(scenario, [], 0, frames.append, progress, first)
         return Run(
-            outcome, scenario, None, _observables(frames[-1]), len(frames) - 1, perf_counter() - start, tuple(frames)
+            outcome, scenario, None, _observables(frames[-1]), len(frames) - 1, perf_counter() - began, tuple(frames)
         )
-    begin = RunStore.resume if resume and holds_run(out) else RunStore.create
+    begin = RunStore.resume if resume and holds_store(out) else RunStore.create
     with begin(out, scenario) as store:
         if ready is not None:
             ready(len(store))
-        outcome = _advance(store, progress)
+        outcome = _advance(store, progress, first)
         last = _observables(store.read(-1))
-        return Run(outcome, store.scenario, store.path, last, len(store) - 1, perf_counter() - start)
+        return Run(outcome, store.scenario, store.path, last, len(store) - 1, perf_counter() - began)
+
+
+def store_frame(path: str | Path, scenario: Scenario, frame: Frame, outcome: Outcome) -> None:
+    """Store one state as a run that has not started to move."""
+    with RunStore.create(path, scenario) as store:
+        store.append(frame)
+        store.finish(outcome)
 
 
 def free_path(name: str, root: str | Path = "results") -> Path:
@@ -97,7 +112,7 @@ def _observables(frame: Frame) -> dict[str, float]:
     return {"time": frame.time, **frame.observables}
 
 
-def _advance(store: RunStore, progress: Progress | None) -> Outcome:
+def _advance(store: RunStore, progress: Progress | None, start: Start | None) -> Outcome:
     """Bring a store to its scenario's end, where it is not there yet."""
     history = store.last(HISTORY)
     if store.outcome in _FINAL:
@@ -109,13 +124,18 @@ def _advance(store: RunStore, progress: Progress | None) -> Outcome:
     elif len(store) > settings.max_steps:
         end = Outcome.MAX_STEPS
     if end is None or end != store.outcome:
-        end = end or _simulate(store.scenario, history, len(store), store.append, progress)
+        end = end or _simulate(store.scenario, history, len(store), store.append, progress, start)
         store.finish(end)
     return end
 
 
 def _simulate(
-    scenario: Scenario, history: list[Frame], count: int, record: Callable[[Frame], None], progress: Progress | None
+    scenario: Scenario,
+    history: list[Frame],
+    count: int,
+    record: Callable[[Frame], None],
+    progress: Progress | None,
+    start: Start | None,
 ) -> Outcome:
     """Record frame after frame; `count` frames are there already, of which `history` are the last."""
     # Imported late: with it comes the array library, which a bad request should not have to wait for.
@@ -123,7 +143,7 @@ def _simulate(
 
     # The simulation counts its own steps; the limit is on those of the whole run.
     left = scenario.run.max_steps - max(0, count - 1)
-    simulation = Simulation(scenario.with_overrides({"max_steps": left}), history)
+    simulation = Simulation(scenario.with_overrides({"max_steps": left}), history, start.frame if start else None)
     for number, frame in enumerate(simulation, start=count):
         record(frame)
         if progress is not None:

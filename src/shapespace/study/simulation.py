@@ -10,8 +10,7 @@ from shapespace.analysis.evolution import Evolution, Moment, Stepping
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.numerics.collocation import CollocationProblem
-from shapespace.numerics.state import State
-from shapespace.study.engine import Engine
+from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.observables import measure, neck_radius
 from shapespace.study.scenario import Scenario
@@ -25,12 +24,14 @@ CLOSING_RADIUS = 1e-4
 class Simulation:
     """Iterate for the frames of a scenario; afterwards `outcome` says why they ended.
 
-    history: the last frames of a stored run, to go on from; without them the first frame is the initial state.
+    history: the last frames of a stored run, to go on from. Without them the first frame is the start: a state that is
+    given, or the scenario's initial one.
     """
 
-    def __init__(self, scenario: Scenario, history: Sequence[Frame] = ()) -> None:
+    def __init__(self, scenario: Scenario, history: Sequence[Frame] = (), start: Frame | None = None) -> None:
         self.scenario = scenario
         self.history = list(history)
+        self.start = start
         self.outcome = Outcome.REACHED_END
         self._engine = Engine.of(scenario)
         self._order = 1 if self._engine.values["dt"] > 0.0 else ORDER
@@ -44,7 +45,8 @@ class Simulation:
             unit = self.scenario.scales.factor("energy")
             self._energies = [(frame.time / time_scale, frame.observables["energy"] / unit) for frame in self.history]
         else:
-            past = [Moment(0.0, engine.problem, engine.problem.pack(engine.initial_state()))]
+            state = engine.initial_state() if self.start is None else state_of(self.start)
+            past = [Moment(0.0, *engine.placed(state))]
             yield self._frame(past[0], resting=True)
         run = engine.values
         stepping = Stepping(
@@ -68,8 +70,9 @@ class Simulation:
         """The moment of a stored frame."""
         scale = self.scenario.scales.factor("time")
         problem = self._engine.problem.on_mesh(frame.mesh)
-        state = State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)
-        return Moment(frame.time / scale, problem, problem.pack(state), frame.step / scale, frame.next_step / scale)
+        return Moment(
+            frame.time / scale, problem, problem.pack(state_of(frame)), frame.step / scale, frame.next_step / scale
+        )
 
     def _frame(self, moment: Moment, resting: bool = False) -> Frame:
         """Everything to store of a moment; the initial state has no rates yet."""

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
 from shapespace.analysis.extended import Parameter
 from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
-from shapespace.analysis.stationary import Stationary, solve_stationary
+from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.analysis.tracing import Located, side_branches, traced
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
@@ -19,11 +21,12 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.numerics.newton import Newton
 from shapespace.numerics.state import State
-from shapespace.study.engine import Engine
+from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.observables import measure
 from shapespace.study.scenario import Scenario
+from shapespace.study.starts import Start, find_start
 
 NEWTON = Newton(tolerance=1e-10)
 MAX_POINTS = 400
@@ -35,6 +38,34 @@ class StateName(StrEnum):
 
     DEFAULT = "default"
     TRIVIAL = "trivial"
+
+
+@dataclass(frozen=True)
+class Rates:
+    """Leading growth rates of a state in its scenario's units, with what is known of them: see `Spectrum`.
+
+    values: (real, imaginary), largest real part first. n_unstable: None where the rates did not converge.
+    """
+
+    outcome: Outcome
+    values: list[tuple[float, float]]
+    errors: list[float]
+    parities: list[str | None]
+    neutral: dict[int, str]
+    n_unstable: int | None
+
+    @classmethod
+    def of(cls, spectrum: Spectrum, scenario: Scenario) -> Self:
+        """From a dimensionless spectrum."""
+        unit = scenario.scales.factor("time")
+        return cls(
+            spectrum.outcome,
+            [(rate.real / unit, rate.imag / unit) for rate in spectrum.rates.tolist()],
+            (spectrum.errors / unit).tolist(),
+            list(spectrum.parities),
+            dict(spectrum.neutral),
+            spectrum.n_unstable,
+        )
 
 
 @dataclass(frozen=True)
@@ -64,6 +95,15 @@ class Steady:
         """Leading growth rates and modes, dimensionless."""
         return solve_spectrum(self.problem, self.found.x, self.found.p, Spectral(count=count))
 
+    def rates(self, count: int = 6) -> Rates:
+        """Leading growth rates in the scenario's units."""
+        return Rates.of(self.spectrum(count), self.scenario)
+
+    @property
+    def reached(self) -> dict[str, float]:
+        """The keys that were varied on the way, with the values they came to."""
+        return dict(zip(self.problem.keys, self.found.p.tolist(), strict=True))
+
     @property
     def frame(self) -> Frame:
         """The state as a frame at time zero, to store or to start from."""
@@ -74,7 +114,6 @@ def observables_at(scenario: Scenario, problem: KeyedProblem, x: Array) -> dict[
     """Observables of a state of the scenario at rest, in its units."""
     engine = replace(Engine.of(scenario), problem=problem.base)
     values = measure(engine, x, Rate.of_growth(problem.base.stored(x, engine.p)))
-    values.pop("energy")
     return {name: value * scenario.scales.factor(name) for name, value in values.items()}
 
 
@@ -87,18 +126,45 @@ def frame_of(problem: KeyedProblem, x: Array, observables: dict[str, float]) -> 
     )
 
 
-def state_of(frame: Frame) -> State:
-    """The state that a frame holds."""
-    return State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)
-
-
 def steady_from(scenario: Scenario, state: State, keys: tuple[str, ...] = ()) -> Steady:
     """The stationary state of the scenario next to a given state, by Newton's method."""
     keys = keys or (_main_key(scenario),)
     problem = KeyedProblem.of(scenario, keys)
-    problem = replace(problem, base=problem.base.on_mesh(state.mesh))
-    found = solve_stationary(problem, problem.base.pack(state), key_values(scenario, keys), NEWTON)
+    base, x = Engine.of(scenario).placed(state)
+    found = solve_stationary(replace(problem, base=base), x, key_values(scenario, keys), NEWTON)
     return _steady(scenario, found)
+
+
+def steady(
+    scenario: Scenario, *, state: StateName | str = StateName.DEFAULT, start: Start | str | Path | None = None
+) -> Steady:
+    """A stationary state: the named one of the scenario, or the one that a stored state becomes at its parameters.
+
+    start: `STORE` or `STORE:LABEL`, as text or as `find_start` returns it. The result's outcome says whether there is one.
+    """
+    if state not in tuple(StateName):
+        raise InputError(f"state = {state}: is unknown; choose one of {', '.join(StateName)}.")
+    if start is None:
+        return solve_steady(scenario, StateName(state))
+    return steady_near(scenario, start if isinstance(start, Start) else find_start(start))
+
+
+def steady_near(scenario: Scenario, start: Start) -> Steady:
+    """What a stored state becomes at the scenario's parameters: settled at its own ones first, then by stepping."""
+    start.check_fits(scenario)
+    mine, theirs = scenario.parameters.model_dump(), start.scenario.parameters.model_dump()
+    keys = tuple(key for key, value in mine.items() if theirs[key] != value)
+    state = state_of(start.frame)
+    if not keys:
+        return steady_from(scenario, state)
+    origin = scenario.with_overrides({key: theirs[key] for key in keys})
+    settled = steady_from(origin, state, keys)
+    if not settled.outcome.is_success:
+        return replace(settled, scenario=scenario)
+    found = step_to(settled.found, key_values(scenario, keys))
+    return _steady(
+        scenario, solve_stationary(found.problem, found.x, found.p, NEWTON) if found.outcome.is_success else found
+    )
 
 
 def solve_steady(scenario: Scenario, name: StateName = StateName.DEFAULT) -> Steady:
@@ -148,7 +214,9 @@ def _along(scenario: Scenario, first: Point, value: float) -> Steady:
     )
     *_, last = [first, *branch]
     if branch.outcome is not Outcome.REACHED_STOP:
-        found = Stationary(last.problem, last.x, last.p, Outcome.NOT_REACHED, np.nan, np.nan, 0, False)
+        still = Rate.of_growth(last.problem.stored(last.x, last.p))
+        residual = float(np.abs(last.problem.residual(last.x, last.p, still)).max())
+        found = Stationary(last.problem, last.x, last.p, Outcome.NOT_REACHED, np.nan, residual, 0, False)
     else:
         found = solve_stationary(last.problem, last.x, last.p, NEWTON)
     return _steady(scenario, found)

@@ -1,4 +1,4 @@
-"""Pictures of runs, stored or in memory: what `ss.plot` and `ss.movie` do."""
+"""Pictures of runs and branches, stored or in memory: what `ss.plot` and `ss.movie` do."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -7,7 +7,10 @@ from typing import Protocol
 import xarray as xr
 from matplotlib.figure import Figure
 
+from shapespace.study.branch_store import Branch, open_branch
 from shapespace.study.dataset import open_dataset
+from shapespace.study.records import noun_of
+from shapespace.view.branch import plot_branch
 from shapespace.view.figure import plot_run
 from shapespace.view.movie import save_movie
 
@@ -30,9 +33,11 @@ def _dataset_of(source: Source) -> xr.Dataset:
     return open_dataset(source) if isinstance(source, str | Path) else source.dataset
 
 
-def plot(source: Source, out: str | Path | None = None) -> Figure:
-    """The figure of a run, in the layout of the paper's figure; also written to `out` (.png, .pdf, .svg) if given."""
-    figure = plot_run(_dataset_of(source))
+def plot(source: Source | Branch, out: str | Path | None = None) -> Figure:
+    """The figure of a run or of a branch, stored or not; also written to `out` (.png, .pdf, .svg) if given."""
+    if isinstance(source, str | Path) and noun_of(source) == "branch":
+        source = open_branch(source)
+    figure = plot_branch(source) if isinstance(source, Branch) else plot_run(_dataset_of(source))
     if out is not None:
         figure.savefig(out)
     return figure

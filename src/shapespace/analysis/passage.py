@@ -1,0 +1,128 @@
+"""What lies between two neighbouring points of a branch: any place, where something changes, and Hopf points."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.polynomial.polynomial import polyder, polyval
+
+from shapespace.analysis.branch import Point, hermite, metric, orthogonal_plane
+from shapespace.analysis.stability import Spectrum
+from shapespace.base.problem import AbstractSmoothProblem, Rate
+from shapespace.numerics.newton import Newton, solve_root
+
+PLACE = Newton(tolerance=1e-10)
+BISECTIONS = 16
+"""Halvings of the way between two points."""
+HOPF_STEPS = 12
+ON_AXIS = 1e-9
+"""A pair's real part below this, relative to its frequency, is zero: as exact as spectra are."""
+SAFETY = 2.0
+"""Of the parameter's error, over its change on a finer mesh."""
+
+SpectrumOf = Callable[[Point], Spectrum]
+
+
+def point_between(before: Point, after: Point, share: float) -> Point | None:
+    """The point of the branch at this share of the arclength, on the discretisation of the end; None where Newton fails.
+
+    Its tangent is that of the cubic through both ends.
+    """
+    problem, start = after.problem, before.on(after.problem)
+    length = after.arclength - start.arclength
+    cubic = hermite(start.joined, start.tangent, after.joined, after.tangent, length)
+    guess, along = (np.asarray(polyval(share * length, part)) for part in (cubic, polyder(cubic)))
+    weights = metric(problem, guess)
+    tangent = along / np.sqrt(weights @ along**2)
+    plane = orthogonal_plane(after, weights * tangent, guess)
+    rate = Rate.of_growth(problem.stored(after.x, after.p))
+    root = solve_root(plane, guess, after.p, rate, PLACE)
+    if not root.outcome.is_success:
+        return None
+    x, p = plane.split(root.x, after.p)
+    return Point(problem, x, p, after.index, tangent, start.arclength + share * length, step=after.step)
+
+
+def first_change(before: Point, after: Point, holds: Callable[[Point], bool]) -> tuple[Point, Point]:
+    """Two close points between which something starts to hold that holds at the end and not at the start."""
+    low, high = before, after
+    a, b = 0.0, 1.0
+    for _ in range(BISECTIONS):
+        place = point_between(before, after, 0.5 * (a + b))
+        if place is None:
+            break
+        if holds(place):
+            high, b = place, 0.5 * (a + b)
+        else:
+            low, a = place, 0.5 * (a + b)
+    return low, high
+
+
+@dataclass(frozen=True)
+class Hopf:
+    """A point where a pair of rates crosses the imaginary axis. frequency: of the pair, > 0."""
+
+    point: Point
+    spectrum: Spectrum
+    frequency: float
+    parameter_error: float
+
+
+def growing_pairs(spectrum: Spectrum) -> int:
+    """How many of the leading pairs of complex rates grow."""
+    return int(np.count_nonzero((spectrum.rates.imag > 0.0) & (spectrum.rates.real > 0.0)))
+
+
+def locate_hopf(before: Point, after: Point, spectra: tuple[Spectrum, Spectrum], of: SpectrumOf) -> Hopf | None:
+    """Where a pair crosses the axis between two points with different numbers of growing pairs; None where it is not found.
+
+    By regula falsi on the real part of the pair next to the axis, halving where that moves one end only.
+    """
+    a, b = 0.0, 1.0
+    fa, fb = (_nearest_axis(spectrum).real for spectrum in spectra)
+    count = growing_pairs(spectra[0])
+    share, found, kept = 0.5, None, 0
+    for _ in range(HOPF_STEPS):
+        if fa * fb < 0.0 and abs(kept) < 2:
+            share = float(np.clip((a * fb - b * fa) / (fb - fa), a + 0.05 * (b - a), b - 0.05 * (b - a)))
+        else:
+            share, kept = 0.5 * (a + b), 0
+        point = point_between(before, after, share)
+        spectrum = None if point is None else of(point)
+        if point is None or spectrum is None or not spectrum.converged:
+            return None
+        pair = _nearest_axis(spectrum)
+        if pair.imag == 0.0:
+            return None
+        found = (point, spectrum, pair)
+        if abs(pair.real) <= ON_AXIS * abs(pair.imag):
+            break
+        if growing_pairs(spectrum) == count:
+            a, fa, kept = share, pair.real, min(kept, 0) - 1
+        else:
+            b, fb, kept = share, pair.real, max(kept, 0) + 1
+    if found is None or abs(found[2].real) > 1e-5 * abs(found[2].imag):
+        return None
+    point, spectrum, pair = found
+    slope = (fb - fa) / (b - a) / max(abs(after.parameter - before.parameter), 1e-300)
+    return Hopf(point, spectrum, float(pair.imag), _error(point, pair, slope, of))
+
+
+def _nearest_axis(spectrum: Spectrum) -> complex:
+    """Of the pairs the one closest to the imaginary axis; zero where there is none."""
+    pairs = spectrum.rates[spectrum.rates.imag > 0.0]
+    return complex(pairs[np.argmin(np.abs(pairs.real))]) if len(pairs) else 0.0j
+
+
+def _error(point: Point, pair: complex, slope: float, of: SpectrumOf) -> float:
+    """How far the parameter is off where the pair's real part is, here or on a mesh twice as fine."""
+    assert isinstance(point.problem, AbstractSmoothProblem)
+    finer, left = point.problem.refined(), abs(pair.real)
+    if finer is not None:
+        x = point.problem.carried(point.x, finer)
+        root = solve_root(finer, x, point.p, Rate.of_growth(finer.stored(x, point.p)), PLACE)
+        spectrum = of(replace(point, problem=finer, x=root.x))
+        if not (root.outcome.is_success and spectrum.converged):
+            return float("nan")
+        left += SAFETY * abs(_nearest_axis(spectrum).real - pair.real)
+    return float(left / abs(slope)) if slope else float("nan")

@@ -1,0 +1,55 @@
+"""The command line: reads arguments, calls the library, reports. Results go to stdout, the rest to stderr.
+
+Exit status: 0 success, 1 a failed check, 2 bad input (nothing written), 3 the solver gave up (partial store kept),
+130 interrupted (store ready to resume). Libraries that load slowly are imported by the commands that need them.
+"""
+
+import os
+import sys
+from collections.abc import Sequence
+
+from cyclopts import CycloptsError
+
+from shapespace.base.errors import InputError
+
+# Commands register themselves, and are listed in help in this order.
+from shapespace.cli import runs as runs  # isort: skip
+from shapespace.cli import states as states  # isort: skip
+from shapespace.cli import branches as branches  # isort: skip
+from shapespace.cli import pictures as pictures  # isort: skip
+from shapespace.cli import checking as checking  # isort: skip
+from shapespace.cli.shared import BAD_INPUT, INTERRUPTED, app, tell
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status."""
+    tokens = _spread(sys.argv[1:] if arguments is None else arguments)
+    try:
+        status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        sys.stdout.flush()
+    except InputError as error:
+        tell(str(error))
+        return BAD_INPUT
+    except CycloptsError as error:
+        tell(f"{' '.join(str(error).split())} See `shapespace --help`.")
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        tell("interrupted.")
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of stdout has left (`| head`): not an error, but Python must not try to flush again.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    return status if isinstance(status, int) else 0
+
+
+def _spread(tokens: Sequence[str]) -> list[str]:
+    """`-s a=1 b=2` as `-s a=1 -s b=2`."""
+    result: list[str] = []
+    in_settings = False
+    for token in tokens:
+        if in_settings and "=" in token and not token.startswith("-") and result[-1] not in ("-s", "--set"):
+            result.append("-s")
+        in_settings = token in ("-s", "--set") or (in_settings and "=" in token and not token.startswith("-"))
+        result.append(token)
+    return result

@@ -1,0 +1,190 @@
+"""The command `branch`: stationary states followed in one key."""
+
+import json
+import math
+import shlex
+import sys
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from shapespace.base.errors import InputError
+from shapespace.cli.shared import (
+    GAVE_UP,
+    INTERRUPTED,
+    AsJson,
+    NameOrFile,
+    Settings,
+    StartFrom,
+    app,
+    described,
+    examples,
+    find_scenario,
+    finite,
+    print_lines,
+    read_settings,
+    tell,
+)
+
+if TYPE_CHECKING:
+    from shapespace.study.branch_point import BranchPoint
+    from shapespace.study.branch_store import Branch
+
+
+@app.command(
+    name="branch",
+    help_epilogue=examples(
+        "shapespace branch polar-swimmer --vary peclet --start 15 --stop 30 --out results/sphere",
+        "shapespace branch polar-swimmer --vary peclet --stop 60 --from results/sphere:pitchfork-1 --side 1",
+        "shapespace branch guided-division --vary ring_amplitude --start 0 --stop 4.2 --at 1.5,2",
+    ),
+)
+def branch_command(
+    scenario: NameOrFile,
+    /,
+    *,
+    vary: Annotated[str, Parameter(metavar="KEY", help="The key to vary.")],
+    stop: Annotated[float, Parameter(metavar="B", help="Value of the key at which the branch ends.")],
+    start: Annotated[
+        float | None, Parameter(metavar="A", help="Value of the key to start at; the default is that of the start.")
+    ] = None,
+    at: Annotated[str | None, Parameter(metavar="V1,V2,...", help="Values of the key to stop at exactly.")] = None,
+    settings: Settings = (),
+    origin: StartFrom = None,
+    state: Annotated[str | None, Parameter(metavar="NAME", help="Start from the default or the trivial state.")] = None,
+    side: Annotated[
+        int, Parameter(metavar="1|-1|0", help="From a branch point: the other branch to one or the other side.")
+    ] = 0,
+    both: Annotated[bool, Parameter(help="Also the other way from A, as far as B is on this side.")] = False,
+    no_stability: Annotated[bool, Parameter(help="Without growth rates, in about half the time.")] = False,
+    out: Annotated[
+        Path | None, Parameter(metavar="DIR", help="New directory; the default is results/NAME-KEY.")
+    ] = None,
+    resume: Annotated[bool, Parameter(help="Continue the branch in DIR, or start it where there is none yet.")] = False,
+    as_json: AsJson = False,
+) -> int:
+    """Follow a stationary state while one key changes, through folds; find and name the special points on the way."""
+    from shapespace.study.branching import branch
+    from shapespace.study.run import free_path
+
+    values = _read_values(at)
+    chosen = find_scenario(scenario).with_overrides(read_settings(settings))
+    name = f"{chosen.name}-{vary}"
+    path = out or (Path("results") / name if resume else free_path(name))
+    display = _Display(vary)
+    try:
+        found = branch(
+            chosen,
+            vary,
+            stop,
+            start=start,
+            at=values,
+            origin=origin,
+            state=state,
+            side=side,
+            both=both,
+            stability=not no_stability,
+            out=path,
+            resume=resume,
+            progress=display.update,
+            ready=lambda count: tell(f"continuing {path} after {count} points" if count else f"starting {path}"),
+        )
+    except KeyboardInterrupt:
+        tell(f"interrupted; to continue: {shlex.join(_again(path))}")
+        return INTERRUPTED
+    if as_json:
+        print(json.dumps(_record(found), allow_nan=False))
+    else:
+        _summarise(found)
+    return _report(found)
+
+
+def _again(path: Path) -> list[str]:
+    """The command that goes on with an interrupted branch: the same one, with where and how."""
+    words = [word for word in sys.argv[1:] if word != "--resume"]
+    return ["shapespace", *words, *([] if "--out" in words else ["--out", str(path)]), "--resume"]
+
+
+def _report(found: "Branch") -> int:
+    """Say on stderr what was missed or went wrong; the exit status."""
+    for one in found.missed:
+        tell(
+            f"a {one['kind']} between {found.key} = {one['parameter_before']:.8g} and {one['parameter_after']:.8g} was not "
+            f"located ({one['outcome']})."
+        )
+    if found.outcome is None or found.outcome.is_success:
+        return 0
+    tell(f"the branch ended early ({found.outcome}): {found.outcome.advice} What there is is in {found.store}.")
+    return GAVE_UP
+
+
+def _read_values(text: str | None) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")] if text else []
+    except ValueError:
+        raise InputError(f"--at {text}: must be numbers with commas between them, e.g. --at 1.5,2.") from None
+
+
+class _Display:
+    """Where a branch stands, on stderr: a line for special points, and one now and then."""
+
+    def __init__(self, key: str, seconds_between_lines: float = 5.0) -> None:
+        self._key, self._pause, self._told = key, seconds_between_lines, -math.inf
+
+    def update(self, point: "BranchPoint", count: int) -> None:
+        """Take note of a new point."""
+        now = monotonic()
+        if point.label or now - self._told >= self._pause:
+            self._told = now
+            growing = "" if point.n_unstable is None else f", n_unstable {point.n_unstable}"
+            tell(f"{count} points, {self._key} = {point.parameter:.8g}{growing} {point.label}".rstrip())
+
+
+def _record(found: "Branch") -> dict[str, Any]:
+    """What --json prints."""
+    assert found.outcome is not None
+    last = found.points[-1].observables if found.points else {}
+    return {
+        **described(found.outcome, found.scenario, last),
+        "store": str(found.store),
+        "vary": found.key,
+        "special_points": [
+            {
+                "label": point.label,
+                "kind": point.kind,
+                "parameter": point.parameter,
+                "parameter_error": point.parameter_error if math.isfinite(point.parameter_error) else None,
+                "observables": finite(point.observables),
+                "growth_rates": point.growth_rates.tolist(),
+                "n_unstable_before": point.n_unstable_before,
+                "n_unstable_after": point.n_unstable_after,
+            }
+            for point in found.special_points
+        ],
+        "points": [
+            {
+                "parameter": point.parameter,
+                "observables": finite(point.observables),
+                "n_unstable": point.n_unstable,
+                "label": point.label,
+            }
+            for point in found.points
+            if point.is_step
+        ],
+        "missed": list(found.missed),
+    }
+
+
+def _summarise(found: "Branch") -> None:
+    from rich.table import Table
+
+    table = Table("label", found.key, "error", "growing before", "after", "leading rate", box=None, header_style="bold")
+    for point in found.special_points:
+        counts = ["?" if n is None else str(n) for n in (point.n_unstable_before, point.n_unstable_after)]
+        rate = f"{point.growth_rates[0][0]:.6g}" if len(point.growth_rates) else ""
+        table.add_row(point.label, f"{point.parameter:.10g}", f"{point.parameter_error:.1g}", *counts, rate)
+    assert found.outcome is not None
+    count = sum(point.is_step for point in found.points)
+    print_lines(table, f"{found.outcome}: {found.outcome.advice}", f"{count} points; stored in {found.store}")

@@ -1,0 +1,96 @@
+"""Commands that look at what is stored: `plot`, `movie`, `export`."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from shapespace.base.errors import InputError
+from shapespace.cli.shared import Store, app, examples
+
+
+@app.command(
+    help_epilogue=examples(
+        "shapespace plot results/guided-division", "shapespace plot results/guided-division --out division.pdf"
+    )
+)
+def plot(
+    store: Store,
+    /,
+    *,
+    out: Annotated[Path | None, Parameter(metavar="FILE", help="Picture file; the default is DIR/figure.png.")] = None,
+    observable: Annotated[
+        str | None, Parameter(metavar="NAME", help="Of a branch: what to draw against the key that varies.")
+    ] = None,
+) -> None:
+    """Draw what is stored.
+
+    Of a run a curve over time, snapshots of the surface, profiles of velocity and curvature; of a branch an observable
+    against the key that varies, solid where it is stable, with its special points.
+    """
+    from shapespace.study.files import replacing
+    from shapespace.study.records import noun_of
+
+    if noun_of(store) == "branch":
+        from shapespace.study.branch_store import open_branch
+        from shapespace.view.branch import plot_branch
+
+        figure = plot_branch(open_branch(store), observable)
+    else:
+        from shapespace.study.dataset import open_dataset
+        from shapespace.view.figure import plot_run
+
+        figure = plot_run(open_dataset(store))
+    target = out or store / "figure.png"
+    if target.suffix[1:] not in (known := figure.canvas.get_supported_filetypes()):
+        raise InputError(f"{target}: has no ending of a picture; end it in one of .{', .'.join(sorted(known))}.")
+    with replacing(target) as partial:
+        figure.savefig(partial, dpi=300)
+    print(target)
+
+
+@app.command(
+    help_epilogue=examples(
+        "shapespace movie results/guided-division", "shapespace movie results/guided-division --out division.gif"
+    )
+)
+def movie(
+    store: Store,
+    /,
+    *,
+    out: Annotated[Path | None, Parameter(metavar="FILE", help="Movie file; the default is DIR/movie.mp4.")] = None,
+) -> None:
+    """Make a movie of a stored run, as .mp4 or .gif; a gif where there is no ffmpeg."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from shapespace.study.dataset import open_dataset
+    from shapespace.view.movie import save_movie
+
+    dataset = open_dataset(store)
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("drawing frames", total=None)
+        written = save_movie(
+            dataset, out or store / "movie.mp4", lambda done, total: bar.update(task, completed=done, total=total)
+        )
+    print(written)
+
+
+@app.command(help_epilogue=examples("shapespace export results/guided-division division.nc"))
+def export(
+    store: Store,
+    file: Annotated[Path, Parameter(name="FILE", help="NetCDF file, ending in .nc.")],
+    /,
+) -> None:
+    """Write a stored run as one self-describing NetCDF file, readable by xarray, Python, Julia, MATLAB."""
+    from shapespace.study.dataset import open_dataset
+    from shapespace.study.files import storage, write_atomically
+
+    if file.suffix != ".nc":
+        raise InputError(f"{file}: is not named as a NetCDF file; end it in .nc.")
+    # Made in memory: HDF5 crashes the process at its end when a disk is full under an open file.
+    data = open_dataset(store).to_netcdf(engine="h5netcdf")
+    with storage(file):
+        write_atomically(file, bytes(data))
+    print(file)

@@ -1,0 +1,140 @@
+"""What the commands share: the application, exit statuses, options, and how scenarios and settings are read."""
+
+import math
+import os
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import App, Parameter
+
+from shapespace.base.errors import InputError
+
+if TYPE_CHECKING:
+    from shapespace.base.outcome import Outcome
+    from shapespace.study.scenario import Scenario
+
+BAD_INPUT, GAVE_UP, INTERRUPTED = 2, 3, 130
+
+
+def examples(*lines: str) -> str:
+    """The end of a command's help."""
+    return "\n  ".join(["Examples:", *lines])
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("shapespace")
+    except PackageNotFoundError:
+        return "0 (not installed)"
+
+
+app = App(
+    name="shapespace",
+    help="Dynamics and stationary shapes of axisymmetric active fluid surfaces.",
+    help_epilogue=examples(
+        "shapespace run guided-division",
+        "shapespace plot results/guided-division",
+        "shapespace config ring-slipping --out my.toml",
+        "shapespace run my.toml -s peclet=300",
+    ),
+    help_format="plaintext",
+    version=_version,
+    suppress_keyboard_interrupt=False,
+    default_parameter=Parameter(negative=(), show_default=False),
+)
+
+Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run or a branch, as `shapespace` made it.")]
+NameOrFile = Annotated[str, Parameter(name="NAME_OR_FILE", help="A built-in scenario or a TOML file.")]
+Settings = Annotated[
+    tuple[str, ...],
+    Parameter(name=["--set", "-s"], metavar="KEY=VALUE", help="Change a key of the scenario; may be repeated."),
+]
+AsJson = Annotated[bool, Parameter(name="--json", help="End with one line of JSON on stdout.")]
+StartFrom = Annotated[
+    str | None,
+    Parameter(
+        name="--from",
+        metavar="STORE[:LABEL]",
+        help="Start from the last state of a stored run, or a labelled one of a branch.",
+    ),
+]
+
+
+def tell(text: str) -> None:
+    """A line on stderr."""
+    print(f"shapespace: {text}", file=sys.stderr, flush=True)
+
+
+def read_settings(settings: Sequence[str]) -> dict[str, str]:
+    """The key=value texts of -s; InputError where one is none, or a key is given twice."""
+    changes: dict[str, str] = {}
+    for text in settings:
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not (key and equals and value):
+            raise InputError(f"-s {text}: must be KEY=VALUE without blanks, e.g. -s peclet=300.")
+        if key in changes:
+            raise InputError(f"{key} = {value}: is given twice, also as {changes[key]}; give it once.")
+        changes[key] = value
+    return changes
+
+
+def find_scenario(name_or_file: str) -> "Scenario":
+    """The built-in scenario of this name, or that of a file."""
+    from shapespace.study.scenario import load_scenario, scenario, scenario_names
+
+    is_file = name_or_file.endswith(".toml") or os.sep in name_or_file or Path(name_or_file).exists()
+    is_name = name_or_file in scenario_names() or not is_file
+    return scenario(name_or_file) if is_name else load_scenario(name_or_file)
+
+
+def chosen_scenario(name_or_file: str, changes: Mapping[str, str], start: str | None) -> "Scenario":
+    """The scenario with the changes of -s; at a branch point given by --from with its value of the key that is varied."""
+    chosen = find_scenario(name_or_file).with_overrides(changes)
+    if start is None:
+        return chosen
+    from shapespace.study.starts import find_start
+
+    return find_start(start).placing(chosen, changes)
+
+
+def described(outcome: "Outcome", scenario: "Scenario", observables: Mapping[str, float]) -> dict[str, object]:
+    """What --json prints of any computation: numbers as numbers, and only those that there are."""
+    return {
+        "outcome": outcome.value,
+        "advice": outcome.advice,
+        "scenario": scenario.name,
+        "parameters": scenario.values(),
+        "observables": finite(observables),
+    }
+
+
+def finite(values: Mapping[str, float]) -> dict[str, float]:
+    """The values that are numbers."""
+    return {name: value for name, value in values.items() if math.isfinite(value)}
+
+
+def print_lines(*lines: object) -> None:
+    """Text and tables on stdout."""
+    from rich.console import Console
+
+    console = Console(highlight=False, soft_wrap=True, markup=False)
+    for line in lines:
+        console.print(line)
+
+
+def print_observables(scenario: "Scenario", observables: Mapping[str, float]) -> None:
+    """A table with symbols and units on stdout."""
+    from rich.table import Table
+
+    from shapespace.base.scales import QUANTITIES
+
+    table = Table("observable", "symbol", "value", "unit", box=None, header_style="bold")
+    for name, value in observables.items():
+        symbol = QUANTITIES[name].symbol if name in QUANTITIES else ""
+        unit = scenario.scales.unit(name) if name in QUANTITIES else ""
+        table.add_row(name, symbol, f"{value:.8g}", "" if unit == "1" else unit)
+    print_lines(table)

@@ -1,0 +1,122 @@
+"""Commands about states at rest: `steady`."""
+
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from shapespace.base.errors import InputError
+from shapespace.cli.shared import (
+    GAVE_UP,
+    AsJson,
+    NameOrFile,
+    Settings,
+    StartFrom,
+    app,
+    chosen_scenario,
+    described,
+    examples,
+    print_lines,
+    print_observables,
+    read_settings,
+    tell,
+)
+
+if TYPE_CHECKING:
+    from shapespace.study.steady import Rates, Steady
+
+
+@app.command(
+    name="steady",
+    help_epilogue=examples(
+        "shapespace steady polar-swimmer",
+        "shapespace steady guided-division -s ring_amplitude=2.5 --json",
+        "shapespace steady guided-division --from results/guided-division --out results/divided",
+    ),
+)
+def steady_command(
+    scenario: NameOrFile,
+    /,
+    *,
+    settings: Settings = (),
+    start: StartFrom = None,
+    state: Annotated[
+        str | None,
+        Parameter(metavar="NAME", help="default, or trivial: the resting sphere or the flat disc."),
+    ] = None,
+    out: Annotated[Path | None, Parameter(metavar="DIR", help="New directory to store the state in.")] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Solve for a stationary state; print its observables and the leading growth rates of small perturbations."""
+    from shapespace.study.files import storage
+    from shapespace.study.run import store_frame
+    from shapespace.study.steady import steady
+    from shapespace.study.store import RunStore
+
+    if start is not None and state is not None:
+        raise InputError(f"--state {state} and --from {start}: name two states; give only one.")
+    chosen = chosen_scenario(scenario, read_settings(settings), start)
+    if out is not None:
+        with storage(out):
+            RunStore.check_free(out)
+    found = steady(chosen, state=state or "default", start=start)
+    rates = found.rates() if found.outcome.is_success else None
+    if out is not None and found.outcome.is_success:
+        store_frame(out, chosen, found.frame, found.outcome)
+    if as_json:
+        print(json.dumps(_record(found, rates, out), allow_nan=False))
+    else:
+        _summarise(found, rates, out)
+    if not found.outcome.is_success:
+        tell(f"no stationary state found ({found.outcome}): {found.outcome.advice} {_nearest(found)}")
+        return GAVE_UP
+    if rates is not None and not rates.outcome.is_success:
+        tell(f"the growth rates are not known ({rates.outcome}): {rates.outcome.advice}")
+    return 0
+
+
+def _nearest(found: "Steady") -> str:
+    """Where the search ended."""
+    reached = ", ".join(f"{key} = {value:.8g}" for key, value in found.reached.items())
+    return f"Best residual {found.found.residual:.2g} at {reached}."
+
+
+def _record(found: "Steady", rates: "Rates | None", out: Path | None) -> dict[str, object]:
+    record = described(found.outcome, found.scenario, found.observables if rates else {})
+    record |= {
+        "growth_rates": rates.values if rates else [],
+        "growth_rate_errors": rates.errors if rates else [],
+        "parities": rates.parities if rates else [],
+        "neutral": rates.neutral if rates else {},
+        "n_unstable": rates.n_unstable if rates else None,
+        "residual": found.found.residual if math.isfinite(found.found.residual) else None,
+        "reached": found.reached,
+    }
+    return record | ({"store": str(out)} if out is not None and rates else {})
+
+
+def _summarise(found: "Steady", rates: "Rates | None", out: Path | None) -> None:
+    from rich.table import Table
+
+    if rates is not None:
+        print_observables(found.scenario, found.observables)
+        table = Table("growth rate", "frequency", "error", "mode", box=None, header_style="bold")
+        for i, (real, imaginary) in enumerate(rates.values):
+            kind = " ".join(word for word in (rates.parities[i], _neutral(rates, i)) if word)
+            table.add_row(f"{real:.8g}", f"{imaginary:.8g}" if imaginary else "", f"{rates.errors[i]:.1g}", kind)
+        print_lines("", table, _verdict(rates))
+    print_lines(f"{found.outcome}: {found.outcome.advice}")
+    if out is not None and rates is not None:
+        print_lines(f"stored in {out}")
+
+
+def _neutral(rates: "Rates", i: int) -> str:
+    return f"neutral {rates.neutral[i]}".strip() if i in rates.neutral else ""
+
+
+def _verdict(rates: "Rates") -> str:
+    if rates.n_unstable is None:
+        return "stability unknown"
+    return "stable" if rates.n_unstable == 0 else f"unstable: {rates.n_unstable} growing modes"

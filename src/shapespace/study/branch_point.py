@@ -1,0 +1,93 @@
+"""One stored state of a branch: all that is needed to look at it, to go on from it and to leave it another way."""
+
+import json
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapespace.study.frame import Array, Frame, arrays_of, frame_of_arrays, read_arrays, write_arrays
+
+ComplexArray = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """A point of a branch in one key of its scenario.
+
+    frame: the state, at time zero, with its observables. parameter: the key's value, with the estimated error of a located
+    one. arclength: from the start, in the branch's own metric; step: the next one to try; sign: of the bordered determinant.
+    leg: 0 on the way to the stop, 1 on the way back. tangent (n + 1,); directions (2, n + 1): of both branches through a
+    branch point, else (0, n + 1). growth_rates (m, 2): real and imaginary parts, leading first, in the scenario's units, with
+    errors (m,), parities and names of neutral ones by place; modes (m, n), of labelled points only. n_unstable: None where
+    unknown. label, kind: of special points, else empty. is_step: one of the continuation's own points, not one located
+    between them. ends: outcome with which the leg ends here, else empty. missed: brackets before this point in which nothing
+    was found.
+    """
+
+    frame: Frame
+    parameter: float
+    arclength: float
+    step: float
+    sign: float
+    tangent: Array
+    growth_rates: Array
+    growth_rate_errors: Array
+    next_shift: float
+    parameter_error: float = 0.0
+    directions: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    modes: ComplexArray = field(default_factory=lambda: np.zeros((0, 0), np.complex128))
+    parities: tuple[str | None, ...] = ()
+    neutral: dict[int, str] = field(default_factory=dict)
+    n_unstable: int | None = None
+    n_unstable_before: int | None = None
+    n_unstable_after: int | None = None
+    leg: int = 0
+    label: str = ""
+    kind: str = ""
+    is_step: bool = True
+    ends: str = ""
+    missed: tuple[dict[str, Any], ...] = ()
+
+    @property
+    def observables(self) -> dict[str, float]:
+        """In the scenario's units."""
+        return self.frame.observables
+
+    @property
+    def place(self) -> float:
+        """Arclength, negative on the leg that goes back."""
+        return -self.arclength if self.leg else self.arclength
+
+
+_NUMBERS = ("parameter", "parameter_error", "arclength", "step", "sign", "next_shift")
+_ARRAYS = ("tangent", "directions", "growth_rates", "growth_rate_errors", "modes")
+_WORDS = (
+    "parities", "neutral", "n_unstable", "n_unstable_before", "n_unstable_after", "leg", "label", "kind", "is_step", "ends",
+    "missed",
+)  # fmt: skip
+
+
+def encode_point(point: BranchPoint) -> bytes:
+    """The bytes of a point's file: the arrays of a frame, and those of the branch."""
+    words = json.dumps({name: getattr(point, name) for name in _WORDS})
+    return write_arrays(
+        {
+            **arrays_of(point.frame),
+            "branch": np.array([getattr(point, name) for name in _NUMBERS], dtype=np.float64),
+            **{name: getattr(point, name) for name in _ARRAYS},
+            "about": np.frombuffer(words.encode(), dtype=np.uint8),
+        }
+    )
+
+
+def decode_point(data: bytes) -> BranchPoint:
+    """The point in the bytes of a file; one of DAMAGE where the bytes are not what was written."""
+    stored = read_arrays(data)
+    about = json.loads(stored["about"].tobytes())
+    values: dict[str, Any] = dict(zip(_NUMBERS, stored["branch"].tolist(), strict=True))
+    values |= {name: stored[name] for name in _ARRAYS} | {name: about[name] for name in _WORDS}
+    values |= {name: tuple(values[name]) for name in ("parities", "missed")}
+    values["neutral"] = {int(place): name for place, name in values["neutral"].items()}
+    return BranchPoint(frame=frame_of_arrays(stored), **values)

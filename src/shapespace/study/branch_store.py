@@ -1,0 +1,113 @@
+"""Branches as results: in memory, or in a directory whose `points/NNNNNN.npz` hold one state each; see `records`."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from shapespace.base.errors import InputError, StoreError
+from shapespace.base.outcome import Outcome
+from shapespace.study.branch_point import BranchPoint, decode_point, encode_point
+from shapespace.study.records import AbstractRecordStore
+from shapespace.study.scenario import Scenario
+
+START = "start"
+"""Label of the first point."""
+
+
+class BranchStore(AbstractRecordStore[BranchPoint]):
+    """The points of one branch. `create` and `resume` give a store to write, `open` one to read.
+
+    The manifest's entry `branch` says which branch: key, start, stop, at, and how it was begun.
+    """
+
+    noun = "branch"
+    folder = "points"
+    note = (
+        "arrays of states and modes are dimensionless, in units of the scales; parameters, observables and growth rates are in "
+        "the scenario's units"
+    )
+
+    encode = staticmethod(encode_point)
+    decode = staticmethod(decode_point)
+
+    @classmethod
+    def create(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
+        """A new store in a directory that is empty or does not exist; StoreError, and nothing written, otherwise."""
+        return cls._create(path, scenario, {"branch": dict(request)})
+
+    @classmethod
+    def resume(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
+        """A stored branch to continue. Checks every point; scenario and request must be the same."""
+        path = Path(path)
+        manifest = cls._read_manifest(path)
+        stored, wanted = manifest.get("branch"), dict(request)
+        difference = cls._scenario_of(path, manifest).difference(scenario)
+        if not isinstance(stored, dict):
+            raise StoreError(f"{path / 'store.json'}: is damaged (no branch); restore it, or choose another --out.")
+        for name, value in wanted.items():
+            if stored.get(name) != value:
+                difference = difference or f"{name} is {stored.get(name)!r}, not {value!r}"
+        if difference:
+            raise StoreError(
+                f"{path}: holds a branch whose {difference}; resume with the same value or choose another --out."
+            )
+        return cls._reopen(path, scenario)
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """What was asked for: key, start, stop, at, and how the branch was begun."""
+        return dict(self.manifest["branch"])
+
+    def _disorder(self, previous: BranchPoint, record: BranchPoint) -> str | None:
+        if (record.leg, record.arclength) >= (previous.leg, previous.arclength):
+            return None
+        return f"arclength {record.arclength:g} after {previous.arclength:g}"
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Stationary states of a scenario along a change of one key. points: in the order of the branch, special ones included."""
+
+    outcome: Outcome | None
+    scenario: Scenario
+    key: str
+    points: tuple[BranchPoint, ...]
+    store: Path | None = None
+
+    @property
+    def special_points(self) -> tuple[BranchPoint, ...]:
+        """Folds, branch points, Hopf points, user points and ends, in the order of the branch."""
+        return tuple(point for point in self.points if point.label and point.label != START)
+
+    @property
+    def missed(self) -> tuple[dict[str, Any], ...]:
+        """Brackets between neighbours in which something lies that was not found."""
+        return tuple(one for point in self.points for one in point.missed)
+
+    def __getitem__(self, label: str) -> BranchPoint:
+        """The point of a label; InputError lists the labels where there is none."""
+        for point in self.points:
+            if label and point.label == label:
+                return point
+        labels = ", ".join(point.label for point in self.points if point.label)
+        raise InputError(f"{label}: is no label of this branch; choose one of {labels}.")
+
+    def scenario_at(self, point: BranchPoint) -> Scenario:
+        """The scenario whose stationary state a point is."""
+        return self.scenario.with_overrides({self.key: point.parameter})
+
+
+def open_branch(path: str | Path) -> Branch:
+    """A stored branch, finished or not. StoreError where there is none, or nothing in it yet."""
+    store = BranchStore.open(path)
+    if not len(store):
+        raise StoreError(f"{path}: holds no point yet; continue the branch with --resume.")
+    return collected(store.scenario, store.request["key"], [*store], store.outcome, store.path)
+
+
+def collected(
+    scenario: Scenario, key: str, points: Sequence[BranchPoint], outcome: Outcome | None, store: Path | None
+) -> Branch:
+    """A branch from its points in the order in which they were computed."""
+    return Branch(outcome, scenario, key, tuple(sorted(points, key=lambda point: point.place)), store)

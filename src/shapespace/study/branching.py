@@ -1,0 +1,302 @@
+"""Branches of stationary states: followed in one key of a scenario, with special points, stability and physical ends."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from shapespace.analysis.bifurcation import Kind, SingularPoint
+from shapespace.analysis.branch import Point
+from shapespace.analysis.continuation import MEMORY, Arclength, Continuation, Stop, start_point
+from shapespace.analysis.extended import Parameter
+from shapespace.analysis.passage import first_change
+from shapespace.analysis.tracing import side_branches
+from shapespace.base.errors import InputError
+from shapespace.base.outcome import Outcome
+from shapespace.study.branch_point import BranchPoint
+from shapespace.study.branch_store import START, Branch, BranchStore, collected
+from shapespace.study.engine import Engine, state_of
+from shapespace.study.keyed import KeyedProblem
+from shapespace.study.landmarks import Surveyor, physical_end
+from shapespace.study.records import holds_store
+from shapespace.study.scenario import Scenario
+from shapespace.study.starts import Start, find_start
+from shapespace.study.steady import StateName, Steady, key_values, steady, steady_near
+
+FIRST_STEP = 0.02
+ENDS = (Outcome.REACHED_STOP, Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING)
+"""A leg that came to one of these is complete."""
+
+Progress = Callable[[BranchPoint, int], None]
+"""Called after each new point with the point and the number of points so far."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """Which branch to follow: from start to stop in a key, with exact points at `at`.
+
+    origin: stored state to begin at, as text; without it the state of this name, or the default one, or where there is none
+    the trivial one. side: 1 or -1 for either way along the other branch through a stored branch
+    point, 0 for the branch itself. both: also the other way, as far as from stop to start on the other side. stability:
+    growth rates at every point.
+    """
+
+    key: str
+    start: float
+    stop: float
+    at: tuple[float, ...] = ()
+    origin: str | None = None
+    state: str | None = None
+    side: int = 0
+    both: bool = False
+    stability: bool = True
+
+    def __post_init__(self) -> None:
+        if self.side not in (-1, 0, 1):
+            raise InputError(f"--side {self.side}: must be 1, -1 or 0; choose one of them.")
+        if self.side and self.origin is None:
+            raise InputError(f"--side {self.side}: needs a branch point to leave from; give it as --from STORE:LABEL.")
+        if self.origin is not None and self.state is not None:
+            raise InputError(f"--state {self.state} and --from {self.origin}: name two states; give only one.")
+        if self.start == self.stop and not self.side:
+            raise InputError(
+                f"--stop {self.stop:g}: must differ from the start, {self.start:g}; choose another --stop."
+            )
+        for name, value in (("--start", self.start), ("--stop", self.stop), *(("--at", one) for one in self.at)):
+            if not np.isfinite(value):
+                raise InputError(f"{name} {value}: must be a finite number; give one.")
+
+    @property
+    def direction(self) -> float:
+        """1 where the key rises from start to stop, else -1."""
+        return 1.0 if self.stop >= self.start else -1.0
+
+    @property
+    def bounds(self) -> tuple[float, ...]:
+        """Values of the key at which the branch ends."""
+        other = 2.0 * self.start - self.stop if self.both else self.start
+        return (self.stop,) if self.side else (self.stop, other)
+
+    @property
+    def span(self) -> float:
+        """Change of the key that counts as one."""
+        return abs(self.stop - self.start) or max(abs(self.stop), 1.0)
+
+
+def branch(
+    scenario: Scenario,
+    key: str,
+    stop: float,
+    *,
+    start: float | None = None,
+    at: Sequence[float] = (),
+    origin: str | Path | None = None,
+    state: str | None = None,
+    side: int = 0,
+    both: bool = False,
+    stability: bool = True,
+    out: str | Path | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+    ready: Callable[[int], None] | None = None,
+) -> Branch:
+    """Follow the stationary state of a scenario while one key goes from start to stop, through folds; returns the Branch.
+
+    start: the key's value to begin with; without it the scenario's. The first state is the scenario's named one there, or
+    what the stored state `origin` (`STORE` or `STORE:LABEL`) becomes; see `Request` for state, side, both and stability. `out` is
+    the directory of the store, new or empty; with `resume` a store there is continued, to the same points as if it had
+    never been interrupted. The outcome says how the branch ended. InputError before anything is computed.
+    """
+    known = find_start(origin) if origin is not None else None
+    value = _first_value(scenario, key, start, known)
+    text = None if origin is None else str(origin)
+    request = Request(key, value, float(stop), tuple(map(float, at)), text, state, side, both, stability)
+    scenario = _checked(scenario, request, known)
+    if out is None:
+        if resume:
+            raise InputError("resume = True: needs the directory of a stored branch; give it as out.")
+        points: list[BranchPoint] = []
+        outcome = _follow(scenario, request, known, points, points.append, progress)
+        return collected(scenario, key, points, outcome, None)
+    described = {**asdict(request), "at": list(request.at)}
+    begin = BranchStore.resume if resume and holds_store(out) else BranchStore.create
+    with begin(out, scenario, described) as store:
+        points = [*store]
+        if ready is not None:
+            ready(len(points))
+
+        def keep(point: BranchPoint) -> None:
+            store.append(point)
+            points.append(point)
+
+        if store.outcome not in ENDS:
+            store.finish(_follow(scenario, request, known, points, keep, progress))
+        return collected(scenario, key, points, store.outcome, store.path)
+
+
+def _first_value(scenario: Scenario, key: str, start: float | None, known: Start | None) -> float:
+    KeyedProblem.of(scenario, (key,))  # an InputError where the key cannot vary
+    if start is not None:
+        return float(start)
+    if known is not None and known.key == key and known.point is not None:
+        return known.point.parameter
+    return float(key_values(scenario, (key,))[0])
+
+
+def _checked(scenario: Scenario, request: Request, known: Start | None) -> Scenario:
+    """The scenario at the start; InputError where a value, or the stored start, is not possible."""
+    for value in {request.stop, *request.at, *request.bounds}:
+        scenario.with_overrides({request.key: value})
+    if request.side:
+        point = known.point if known is not None else None
+        if point is None or known is None or known.key != request.key or point.kind not in {*Kind} - {Kind.FOLD}:
+            raise InputError(
+                f"--from {request.origin}: is no pitchfork, transcritical or branch point in {request.key}, so that no other "
+                "branch leaves there; choose another label, or --side 0."
+            )
+    scenario = scenario.with_overrides({request.key: request.start})
+    if known is not None:
+        known.check_fits(scenario)
+    return scenario
+
+
+def _follow(
+    scenario: Scenario,
+    request: Request,
+    known: Start | None,
+    done: Sequence[BranchPoint],
+    keep: Callable[[BranchPoint], None],
+    progress: Progress | None,
+) -> Outcome:
+    """Compute what is missing of a branch of which the points `done` are there; `keep` lengthens them."""
+    surveyor = Surveyor(scenario, request.key, request.stability, done)
+
+    def record(point: BranchPoint) -> None:
+        keep(point)
+        if progress is not None:
+            progress(point, len(done))
+
+    outcome = Outcome.REACHED_STOP
+    for leg in (0, 1) if request.both else (0,):
+        if not done:
+            first = _start(scenario, request, known)
+            if isinstance(first, Outcome):
+                return first
+            record(surveyor.start(first))
+        ended = next((Outcome(point.ends) for point in done if point.leg == leg and point.ends), None)
+        if ended not in ENDS:
+            past = _past(surveyor, done, leg)
+            for point in _leg(surveyor, request, past, leg, done):
+                record(point)
+            ended = surveyor.outcome
+        outcome = ended if outcome.is_success else outcome
+    return outcome
+
+
+def _leg(
+    surveyor: Surveyor, request: Request, past: list[Point], leg: int, done: Sequence[BranchPoint]
+) -> Iterator[BranchPoint]:
+    """New records of one leg: special points before the point after them; in the end `surveyor.outcome` says why."""
+    surveyor.begin(leg, done)
+    if (end := physical_end(past[-1])) is not None:
+        surveyor.outcome = end
+        yield surveyor.end(past[-1], past[-1], end)
+        return
+    stops = [Stop(Parameter(0), value, "end", ends=True) for value in dict.fromkeys(request.bounds)]
+    stops += [Stop(Parameter(0), value, "user") for value in dict.fromkeys(request.at) if value not in request.bounds]
+    options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
+    continuation = Continuation(past, stops, options)
+    last = past[-1]
+    for point in continuation:
+        end = physical_end(point)
+        if end is not None:
+            inside, outside = first_change(last, point, lambda place: physical_end(place) is not None)
+            yield from surveyor.between(last, point, inside.arclength)
+            surveyor.outcome = end = physical_end(outside) or end
+            yield surveyor.end(inside, outside, end)
+            return
+        yield from surveyor.between(last, point)
+        yield surveyor.step(point)
+        last = point
+    surveyor.outcome = continuation.outcome or Outcome.MAX_STEPS
+    if surveyor.outcome is Outcome.BRANCH_STALLED:
+        yield surveyor.end(last, last, surveyor.outcome)
+
+
+def _start(scenario: Scenario, request: Request, known: Start | None) -> Point | Outcome:
+    """The first point, its tangent towards the stop, or along the chosen side."""
+    options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
+    if known is not None and known.point is not None and known.key == request.key and _is_at(known, scenario):
+        problem, place = _placed(scenario, request.key, known.point)
+        if request.side:
+            return side_branches(_singular(known.point, problem, place), known.point.tangent, FIRST_STEP)[
+                0 if request.side > 0 else 1
+            ]
+        rising = place.tangent[-1] * request.direction
+        tangent = place.tangent if rising >= 0.0 else -place.tangent
+        return start_point(problem, place.x, place.p, 0, request.direction, options, tangent)
+    found = _named(scenario, request.state) if known is None else steady_near(scenario, known)
+    if not found.outcome.is_success:
+        return found.outcome
+    return _start_at(found, request, options)
+
+
+def _named(scenario: Scenario, state: str | None) -> Steady:
+    """The state of this name; without a name the default one where there is one, else the trivial one."""
+    found = steady(scenario, state=state or StateName.DEFAULT)
+    return steady(scenario, state=StateName.TRIVIAL) if state is None and not found.outcome.is_success else found
+
+
+def _start_at(found: Steady, request: Request, options: Arclength) -> Point | Outcome:
+    """The first point at a solution."""
+    problem = replace(KeyedProblem.of(found.scenario, (request.key,)), base=found.problem.base)
+    return start_point(problem, found.found.x, np.array([request.start]), 0, request.direction, options)
+
+
+def _is_at(known: Start, scenario: Scenario) -> bool:
+    """Whether a stored state is one of this very scenario, discretisation included."""
+    return known.scenario.parameters == scenario.parameters and known.scenario.numerics == scenario.numerics
+
+
+def _placed(scenario: Scenario, key: str, point: BranchPoint) -> tuple[KeyedProblem, Point]:
+    """A stored point as one to go on from."""
+    problem = KeyedProblem.of(scenario, (key,))
+    problem = replace(problem, base=problem.base.on_mesh(point.frame.mesh))
+    return problem, _point(problem, point)
+
+
+def _point(problem: KeyedProblem, point: BranchPoint) -> Point:
+    x = problem.base.pack(state_of(point.frame))
+    return Point(
+        problem,
+        x,
+        np.array([point.parameter]),
+        0,
+        point.tangent,
+        point.arclength,
+        point.step,
+        point.sign,
+        label=point.label,
+    )
+
+
+def _singular(point: BranchPoint, problem: KeyedProblem, place: Point) -> SingularPoint:
+    return SingularPoint(
+        Kind(point.kind), problem, 0, place.x, place.p, point.parameter_error, point.directions, point.directions
+    )
+
+
+def _past(surveyor: Surveyor, done: Sequence[BranchPoint], leg: int) -> list[Point]:
+    """The last steps of a leg as points, those on equal meshes on one problem."""
+    start = next(point for point in done if point.label == START)
+    steps = [point for point in done if point.leg == leg and point.is_step and point.label != START]
+    chosen = [start, *steps][-MEMORY:]
+    base = KeyedProblem.of(surveyor.scenario, (surveyor.key,))
+    problem, points = base, []
+    for point in chosen:
+        if not np.array_equal(problem.base.mesh, point.frame.mesh):
+            problem = replace(base, base=Engine.of(surveyor.scenario).problem.on_mesh(point.frame.mesh))
+        place = _point(problem, point)
+        points.append(place.reversed() if leg and point is start else place)
+    return points

@@ -1,0 +1,60 @@
+"""States to start from: the last frame of a stored run, or a labelled point of a stored branch."""
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+
+from shapespace.base.errors import InputError, StoreError
+from shapespace.study.branch_point import BranchPoint
+from shapespace.study.branch_store import open_branch
+from shapespace.study.frame import Frame
+from shapespace.study.keys import MODELS
+from shapespace.study.records import noun_of
+from shapespace.study.scenario import Scenario
+from shapespace.study.store import RunStore
+
+
+@dataclass(frozen=True)
+class Start:
+    """A stored state, and the scenario whose state it is. key, point: of a branch."""
+
+    text: str
+    scenario: Scenario
+    frame: Frame
+    key: str | None = None
+    point: BranchPoint | None = None
+
+    def placing(self, scenario: Scenario, changed: Collection[str]) -> Scenario:
+        """The scenario at a branch point's value of the key that the branch varies, unless that key was changed by hand."""
+        rival = None if self.key is None else MODELS[self.scenario.model].rival_of(self.key)
+        if self.key is None or self.point is None or self.key in changed or rival in changed:
+            return scenario
+        self.check_fits(scenario)
+        return scenario.with_overrides({self.key: self.point.parameter})
+
+    def check_fits(self, scenario: Scenario) -> None:
+        """InputError unless the state has the fields that the scenario computes with."""
+        for name, mine, wanted in (
+            ("model", self.scenario.model, scenario.model),
+            ("azimuthal_flow", self.scenario.numerics.azimuthal_flow, scenario.numerics.azimuthal_flow),
+        ):
+            if mine != wanted:
+                raise InputError(f"--from {self.text}: its {name} is {mine}, not {wanted}; choose another start.")
+
+
+def find_start(text: str | Path) -> Start:
+    """The state that `STORE` or `STORE:LABEL` names; of a branch without a label its last one. InputError where none is."""
+    path, label = Path(text), ""
+    if ":" in str(text) and not path.is_dir():
+        store, _, label = str(text).rpartition(":")
+        path = Path(store)
+    if noun_of(path) == "branch":
+        branch = open_branch(path)
+        point = branch[label] if label else branch.points[-1]
+        return Start(str(text), branch.scenario_at(point), point.frame, branch.key, point)
+    run = RunStore.open(path)
+    if label:
+        raise InputError(f"--from {text}: a run has no labels; leave :{label} away to start from its last state.")
+    if not len(run):
+        raise StoreError(f"{path}: holds no time step yet; continue the run with --resume.")
+    return Start(str(text), run.scenario, run.read(-1))
