@@ -27,7 +27,7 @@ import time  # noqa: E402  (threads are set before the libraries load)
 import numpy as np  # noqa: E402
 from benchmarks.peer_solve_bvp import TUNED, USUAL, Peer, StepResult, march  # noqa: E402
 
-from shapespace.analysis.evolution import Evolution, Moment, Stepping  # noqa: E402
+from shapespace.analysis.evolution import STEP_NEWTON, Evolution, Moment, Stepping  # noqa: E402
 from shapespace.base.arrays import Array  # noqa: E402
 from shapespace.numerics.collocation import CollocationProblem  # noqa: E402
 from shapespace.study.engine import Engine  # noqa: E402
@@ -53,10 +53,12 @@ class March(NamedTuple):
 
 
 def ours(elements: int, degree: int, tolerance: float, dt: float = DT, steps: int = STEPS) -> March:
-    """March with us, by backward Euler on an adapted mesh."""
+    """March with us, by backward Euler on an adapted mesh; Newton stops at a hundredth of the mesh's tolerance."""
     engine = Engine.of(scenario("guided-division", elements=elements, degree=degree, mesh_tolerance=tolerance))
     start = Moment(0.0, engine.problem, engine.problem.pack(engine.initial_state()))
-    evolution = Evolution([start], engine.p, steps * dt, Stepping(order=1, fixed_step=dt, stationary_rate=0.0))
+    stepping = Stepping(order=1, fixed_step=dt, stationary_rate=0.0)
+    newton = replace(STEP_NEWTON, tolerance=max(1e-2 * tolerance, 1e-9))
+    evolution = Evolution([start], engine.p, steps * dt, stepping, newton)
     values, seconds, clock = [], [], time.process_time()
     for moment in evolution:
         seconds.append(time.process_time() - clock)
