@@ -8,16 +8,15 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
+from tests.shell import Shell, one_complaint
 from tests.study.fakes import STEPS, FakeSimulation, install
 
 from shapespace.base.outcome import Outcome
-from shapespace.cli import main
 from shapespace.study import files
 from shapespace.study.scenario import load_scenario, scenario, scenario_names, template
 from shapespace.study.store import RunStore
@@ -25,24 +24,6 @@ from shapespace.study.store import RunStore
 ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = ("scenarios", "config", "run", "steady", "branch", "plot", "movie", "export", "check")
 RUN = ("run", "guided-division", "--dt", "0.1", "--until", "1")
-
-
-class Answer(NamedTuple):
-    status: int
-    out: str
-    err: str
-
-
-class Shell:
-    """Runs the command line in this process."""
-
-    def __init__(self, capture: pytest.CaptureFixture[str]) -> None:
-        self.capture = capture
-
-    def __call__(self, *arguments: object) -> Answer:
-        self.capture.readouterr()
-        status = main([str(argument) for argument in arguments])
-        return Answer(status, *self.capture.readouterr())
 
 
 @pytest.fixture
@@ -61,15 +42,6 @@ def shell(
 
 def no_space(_: int) -> None:
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
-
-def one_complaint(answer: Answer, status: int = 2) -> str:
-    """The only line on stderr of a command that failed; nothing may be on stdout."""
-    assert answer.status == status, answer
-    assert answer.out == ""
-    assert answer.err.count("\n") == 1, answer.err
-    assert answer.err.startswith("shapespace: ")
-    return answer.err
 
 
 def test_scenarios_lists_them(shell: Shell):
@@ -264,6 +236,7 @@ def test_resume_where_there_is_nothing_starts_and_says_so(shell: Shell):
 
 _DRIVER = """
 import sys
+from tests.shell import Answer, Shell, one_complaint
 from tests.study.fakes import install
 install().pause = 0.02
 from shapespace.cli import main
@@ -354,30 +327,3 @@ def test_check_reports_line_by_line(shell: Shell, fake: type[FakeSimulation]):
     assert answer.status == 1
     assert "failed  small solve: diverged" in answer.out
     assert not [*Path().iterdir()]
-
-
-def test_steady_prints_a_state_with_its_growth_rates(shell: Shell):
-    """The resting sphere at Pe = 30: its slowest perturbation is odd and grows with (Pe/2 - 2 - k) = 4 (exact result 2)."""
-    command = ("steady", "polar-swimmer", "--state", "trivial", "-s", "elements=20", "peclet=30")
-    record = json.loads(shell(*command, "--json", "--out", "sphere").out, parse_constant=pytest.fail)
-    assert (record["outcome"], record["n_unstable"], record["parities"][0]) == ("converged", 1, "antisymmetric")
-    assert record["growth_rates"][0] == pytest.approx([4.0, 0.0], abs=1e-6)
-    assert record["observables"]["area"] == pytest.approx(4.0 * np.pi)
-    again = json.loads(shell(*command[:2], *command[4:], "--from", "sphere", "--json").out)
-    assert again["growth_rates"][0] == pytest.approx([4.0, 0.0], abs=1e-6)
-    text = shell(*command).out
-    assert "unstable: 1 growing modes" in text
-    assert "antisymmetric" in text
-
-
-def test_steady_says_where_it_got_to_and_what_is_wrong(shell: Shell):
-    answer = shell("steady", "polar-swimmer", "-s", "elements=20", "peclet=15", "--json")
-    record = json.loads(answer.out, parse_constant=pytest.fail)
-    assert (answer.status, record["outcome"], record["observables"]) == (3, "not-reached", {})
-    assert 0.0 <= record["residual"] < 1e-3
-    assert "Best residual" in answer.err
-    Path("foreign").mkdir()
-    Path("foreign/thesis.tex").write_text("precious")
-    assert "name two states" in one_complaint(shell("steady", "polar-swimmer", "--state", "trivial", "--from", "run"))
-    assert "holds other files" in one_complaint(shell("steady", "polar-swimmer", "--out", "foreign"))
-    assert "holds no run" in one_complaint(shell("steady", "polar-swimmer", "--from", "foreign"))

@@ -116,7 +116,8 @@ def _report(found: "Branch") -> int:
         )
     if found.outcome is None or found.outcome.is_success:
         return 0
-    tell(f"the branch ended early ({found.outcome}): {found.outcome.advice} What there is is in {found.store}.")
+    words = [f"the branch ended early ({found.outcome}): {found.outcome.advice}", found.detail]
+    tell(" ".join([*filter(None, words), f"What there is is in {found.store}."]))
     return GAVE_UP
 
 

@@ -70,17 +70,11 @@ def steady_command(
     else:
         _summarise(found, rates, out)
     if not found.outcome.is_success:
-        tell(f"no stationary state found ({found.outcome}): {found.outcome.advice} {_nearest(found)}")
+        tell(f"no stationary state found ({found.outcome}): {found.outcome.advice} Reached: {found.nearest}")
         return GAVE_UP
     if rates is not None and not rates.outcome.is_success:
         tell(f"the growth rates are not known ({rates.outcome}): {rates.outcome.advice}")
     return 0
-
-
-def _nearest(found: "Steady") -> str:
-    """Where the search ended."""
-    reached = ", ".join(f"{key} = {value:.8g}" for key, value in found.reached.items())
-    return f"Best residual {found.found.residual:.2g} at {reached}."
 
 
 def _record(found: "Steady", rates: "Rates | None", out: Path | None) -> dict[str, object]:

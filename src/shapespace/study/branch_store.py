@@ -67,13 +67,17 @@ class BranchStore(AbstractRecordStore[BranchPoint]):
 
 @dataclass(frozen=True)
 class Branch:
-    """Stationary states of a scenario along a change of one key. points: in the order of the branch, special ones included."""
+    """Stationary states of a scenario along a change of one key. points: in the order of the branch, special ones included.
+
+    detail: of a start that failed in this session, how near to a solution it came.
+    """
 
     outcome: Outcome | None
     scenario: Scenario
     key: str
     points: tuple[BranchPoint, ...]
     store: Path | None = None
+    detail: str = ""
 
     @property
     def special_points(self) -> tuple[BranchPoint, ...]:

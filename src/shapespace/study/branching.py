@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,6 +28,14 @@ from shapespace.study.steady import StateName, Steady, key_values, steady, stead
 FIRST_STEP = 0.02
 ENDS = (Outcome.REACHED_STOP, Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING)
 """A leg that came to one of these is complete."""
+
+
+class _End(NamedTuple):
+    """Why a computation is over, and what is to be said of a start that failed."""
+
+    outcome: Outcome
+    detail: str = ""
+
 
 Progress = Callable[[BranchPoint, int], None]
 """Called after each new point with the point and the number of points so far."""
@@ -117,8 +126,8 @@ def branch(
         if resume:
             raise InputError("resume = True: needs the directory of a stored branch; give it as out.")
         points: list[BranchPoint] = []
-        outcome = _follow(scenario, request, known, points, points.append, progress)
-        return collected(scenario, key, points, outcome, None)
+        end = _follow(scenario, request, known, points, points.append, progress)
+        return replace(collected(scenario, key, points, end.outcome, None), detail=end.detail)
     described = {**asdict(request), "at": list(request.at)}
     begin = BranchStore.resume if resume and holds_store(out) else BranchStore.create
     with begin(out, scenario, described) as store:
@@ -130,9 +139,12 @@ def branch(
             store.append(point)
             points.append(point)
 
+        detail = ""
         if store.outcome not in ENDS:
-            store.finish(_follow(scenario, request, known, points, keep, progress))
-        return collected(scenario, key, points, store.outcome, store.path)
+            end = _follow(scenario, request, known, points, keep, progress)
+            store.finish(end.outcome)
+            detail = end.detail
+        return replace(collected(scenario, key, points, store.outcome, store.path), detail=detail)
 
 
 def _first_value(scenario: Scenario, key: str, start: float | None, known: Start | None) -> float:
@@ -168,7 +180,7 @@ def _follow(
     done: Sequence[BranchPoint],
     keep: Callable[[BranchPoint], None],
     progress: Progress | None,
-) -> Outcome:
+) -> _End:
     """Compute what is missing of a branch of which the points `done` are there; `keep` lengthens them."""
     surveyor = Surveyor(scenario, request.key, request.stability, done)
 
@@ -181,7 +193,7 @@ def _follow(
     for leg in (0, 1) if request.both else (0,):
         if not done:
             first = _start(scenario, request, known)
-            if isinstance(first, Outcome):
+            if isinstance(first, _End):
                 return first
             record(surveyor.start(first))
         ended = next((Outcome(point.ends) for point in done if point.leg == leg and point.ends), None)
@@ -191,7 +203,7 @@ def _follow(
                 record(point)
             ended = surveyor.outcome
         outcome = ended if outcome.is_success else outcome
-    return outcome
+    return _End(outcome)
 
 
 def _leg(
@@ -224,7 +236,7 @@ def _leg(
         yield surveyor.end(last, last, surveyor.outcome)
 
 
-def _start(scenario: Scenario, request: Request, known: Start | None) -> Point | Outcome:
+def _start(scenario: Scenario, request: Request, known: Start | None) -> Point | _End:
     """The first point, its tangent towards the stop, or along the chosen side."""
     options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
     if known is not None and known.point is not None and known.key == request.key and _is_at(known, scenario):
@@ -235,11 +247,15 @@ def _start(scenario: Scenario, request: Request, known: Start | None) -> Point |
             ]
         rising = place.tangent[-1] * request.direction
         tangent = place.tangent if rising >= 0.0 else -place.tangent
-        return start_point(problem, place.x, place.p, 0, request.direction, options, tangent)
+        return _begun(start_point(problem, place.x, place.p, 0, request.direction, options, tangent))
     found = _named(scenario, request.state) if known is None else steady_near(scenario, known)
     if not found.outcome.is_success:
-        return found.outcome
-    return _start_at(found, request, options)
+        return _End(found.outcome, f"No state to start from: {found.nearest}")
+    return _begun(_start_at(found, request, options))
+
+
+def _begun(first: Point | Outcome) -> Point | _End:
+    return _End(first, "The start has no single direction to go on in.") if isinstance(first, Outcome) else first
 
 
 def _named(scenario: Scenario, state: str | None) -> Steady:

@@ -15,9 +15,8 @@ from shapespace.geometry.contact import self_crossing
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
 from shapespace.study.keyed import KeyedProblem
-from shapespace.study.observables import neck_radius
+from shapespace.study.observables import CLOSING_RADIUS, neck_radius
 from shapespace.study.scenario import Scenario
-from shapespace.study.simulation import CLOSING_RADIUS
 from shapespace.study.steady import Rates, frame_of, observables_at
 
 HOPF, CHANGE = "hopf", "stability-change"

@@ -8,6 +8,8 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine
 from shapespace.variational.ledger import densities
 
+CLOSING_RADIUS = 1e-4
+"""A neck thinner than this, in units of the surface's length scale, counts as closed."""
 _SAMPLES_PER_ELEMENT = 4
 _ZOOMS = 5
 """Each narrows the place of an extremum eightfold; its value then is exact to round-off."""

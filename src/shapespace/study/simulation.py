@@ -12,13 +12,11 @@ from shapespace.base.problem import Rate
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
-from shapespace.study.observables import measure, neck_radius
+from shapespace.study.observables import CLOSING_RADIUS, measure, neck_radius
 from shapespace.study.scenario import Scenario
 
 ORDER = 3
 """Of the adaptive method; against 2 it needs a third fewer steps at the same tolerance, and is no less stable here."""
-CLOSING_RADIUS = 1e-4
-"""A neck thinner than this, in units of the surface's length scale, counts as closed."""
 
 
 class Simulation:

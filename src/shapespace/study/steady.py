@@ -105,6 +105,12 @@ class Steady:
         return dict(zip(self.problem.keys, self.found.p.tolist(), strict=True))
 
     @property
+    def nearest(self) -> str:
+        """Where a search ended, in words."""
+        reached = ", ".join(f"{key} = {value:.8g}" for key, value in self.reached.items())
+        return f"best residual {self.found.residual:.2g} at {reached}."
+
+    @property
     def frame(self) -> Frame:
         """The state as a frame at time zero, to store or to start from."""
         return frame_of(self.problem, self.found.x, self.observables)
