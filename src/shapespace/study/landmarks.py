@@ -21,8 +21,8 @@ from shapespace.study.steady import Rates, frame_of, observables_at
 
 HOPF, CHANGE = "hopf", "stability-change"
 """Kinds besides those of singular points: a pair of rates crosses the axis; the count of growing modes is not explained."""
-AT_START = 1e-4
-"""A special point within this share of the first step is the start itself."""
+AT_START = 1e-6
+"""A special point on the first step whose key differs less from that of the start, relative to it (or one), is the start."""
 OUTLINE = 6
 """Segments of an outline per element, to see where it crosses itself."""
 
@@ -112,11 +112,9 @@ class Surveyor:
             found += self._hopf(before, after, self._last, spectrum)
             self._explain(before, after, spectrum, found)
         placed = sorted(((_arclength(one, before, after), one) for one in found), key=lambda pair: pair[0])
-        # A branch that starts at a branch point need not find it again.
-        nearest = (
-            before.arclength + AT_START * (after.arclength - before.arclength) if before.arclength == 0.0 else -np.inf
-        )
-        placed = [(place, one) for place, one in placed if nearest < place <= until][self._stored :]
+        placed = [(place, one) for place, one in placed if place <= until and not _is_start(one, before)][
+            self._stored :
+        ]
         self._stored = 0
         ends = [None if one is None else one.n_unstable for one in (self._last, spectrum)]
         counts = [ends[0], *[None] * (len(placed) - 1), ends[1]] if placed else []
@@ -248,6 +246,12 @@ class Surveyor:
 
 def _growing_reals(spectrum: Spectrum) -> int:
     return int(np.count_nonzero((spectrum.rates.imag == 0.0) & (spectrum.rates.real > 0.0)))
+
+
+def _is_start(one: Located | Hopf, before: Point) -> bool:
+    """Whether a special point is where the branch starts: one that leaves a branch point need not find it again."""
+    miss = abs(one.point.parameter - before.parameter)
+    return before.arclength == 0.0 and miss <= AT_START * max(abs(before.parameter), 1.0)
 
 
 def _arclength(one: Located | Hopf, before: Point, after: Point) -> float:
