@@ -15,8 +15,8 @@ from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import Branch
 from shapespace.view import style
 
-TELLING = ("neck_radius", "velocity", "height")
-"""Observables in the order in which they are tried; a symmetric surface does not swim, and its velocity tells nothing."""
+TELLING = {"open-membrane": ("height",), "closed-surface": ("velocity", "equator_radius")}
+"""By model, observables in the order in which they are tried: the velocity of a symmetric surface tells nothing."""
 LEAST_CHANGE = 1e-6
 MARKS = {"fold": "s", "pitchfork": "D", "transcritical": "D", "branch-point": "D", "hopf": "o", "user": "|", "end": ""}
 """By kind; physical ends and stalls are crosses."""
@@ -34,24 +34,23 @@ def plot_branch(branch: Branch, observable: str | None = None) -> Figure:
         figure = Figure(figsize=(style.WIDTH_MM * 0.75 * style.MM, HEIGHT_MM * style.MM), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        for stretch in stretches(branch.points, name):
-            _draw_stretch(axes, stretch, name)
+        lines = {_draw_stretch(axes, stretch, name) for stretch in stretches(branch.points, name)}
         specials = [point for point in known if point in branch.special_points]
         _draw_specials(axes, specials, name)
         axes.margins(0.06, 0.1)
         axes.set_xlabel(_label(branch, branch.key))
         axes.set_ylabel(_label(branch, name))
-        axes.legend(handles=_legend(branch), loc="best")
+        axes.legend(handles=_legend(lines), loc="best")
     return figure
 
 
 def telling_observable(branch: Branch) -> str:
-    """The first of TELLING that exists on most of the branch and changes along it."""
-    for name in TELLING:
-        values = [point.observables[name] for point in branch.points if name in point.observables]
-        if 2 * len(values) > len(branch.points) and np.ptp(values) > LEAST_CHANGE:
+    """The first of TELLING that changes along the branch."""
+    names = TELLING[branch.scenario.model]
+    for name in names:
+        if np.ptp([point.observables[name] for point in branch.points]) > LEAST_CHANGE:
             return name
-    return "height"
+    return names[-1]
 
 
 def stretches(points: Sequence[BranchPoint], name: str) -> list[list[BranchPoint]]:
@@ -64,19 +63,27 @@ def stretches(points: Sequence[BranchPoint], name: str) -> list[list[BranchPoint
         if not found or not found[-1]:
             found.append([point])
             continue
+        last = found[-1][-1]
         found[-1].append(point)
+        if point.is_step and last.is_step and _line(point) != _line(last):
+            found[-1].pop()
+            found.append([last, point])
         if point.label and point.n_unstable_before != point.n_unstable_after:
             found.append([point])
     return [stretch for stretch in found if len(stretch) > 1]
 
 
-def _draw_stretch(axes: Axes, stretch: Sequence[BranchPoint], name: str) -> None:
-    """Solid where nothing grows, dashed where something does, dotted where that is not known."""
-    inner = [point.n_unstable for point in stretch if point.is_step] or [None]
-    known = [count for count in inner if count is not None]
-    line = ":" if not known else "-" if max(known) == 0 else "--"
+def _draw_stretch(axes: Axes, stretch: Sequence[BranchPoint], name: str) -> str:
+    """Solid where nothing grows, dashed where something does, dotted where that is not known; returns which."""
+    inner = [point for point in stretch[1:] if point.is_step] or [point for point in stretch if point.is_step]
+    line = _line(inner[0]) if inner else ":"
     x, y = zip(*((point.parameter, point.observables[name]) for point in stretch), strict=True)
     axes.plot(x, y, line, color=style.BLUE if line == "-" else style.INK)
+    return line
+
+
+def _line(point: BranchPoint) -> str:
+    return ":" if point.n_unstable is None else "-" if point.n_unstable == 0 else "--"
 
 
 def _draw_specials(axes: Axes, points: Sequence[BranchPoint], name: str) -> None:
@@ -95,14 +102,11 @@ def _label(branch: Branch, name: str) -> str:
     return style.axis_label(xr.DataArray(0.0, name=name, attrs=attributes), words=name.replace("_", " "))
 
 
-def _legend(branch: Branch) -> list[Line2D]:
-    """What the lines and marks mean, of those that occur."""
-    counts = {point.n_unstable for point in branch.points if point.is_step}
-    lines = []
-    if 0 in counts:
-        lines.append(Line2D([], [], color=style.BLUE, label="stable"))
-    if counts - {0, None}:
-        lines.append(Line2D([], [], color=style.INK, linestyle="--", label="unstable"))
-    if None in counts:
-        lines.append(Line2D([], [], color=style.INK, linestyle=":", label="stability not known"))
-    return lines
+def _legend(lines: set[str]) -> list[Line2D]:
+    """What the lines mean, of those that are drawn."""
+    handles = [
+        Line2D([], [], color=style.BLUE, linestyle="-", label="stable"),
+        Line2D([], [], color=style.INK, linestyle="--", label="unstable"),
+        Line2D([], [], color=style.INK, linestyle=":", label="stability not known"),
+    ]
+    return [handle for handle in handles if handle.get_linestyle() in lines]

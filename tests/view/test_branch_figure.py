@@ -1,0 +1,50 @@
+"""The line styles of a branch: solid, dashed or dotted by what grows, without gaps between."""
+
+from itertools import pairwise
+from types import SimpleNamespace
+
+import pytest
+
+from shapespace.view.branch import _line, stretches
+
+
+def step(n_unstable: int | None) -> SimpleNamespace:
+    return SimpleNamespace(observables={"height": 1.0}, n_unstable=n_unstable, label="", is_step=True)
+
+
+def special(before: int | None, after: int | None) -> SimpleNamespace:
+    return SimpleNamespace(
+        observables={"height": 1.0},
+        n_unstable=None,
+        label="fold-1",
+        is_step=False,
+        n_unstable_before=before,
+        n_unstable_after=after,
+    )
+
+
+@pytest.mark.parametrize(
+    ("points", "lengths"),
+    [
+        ([step(0), step(0), special(0, 1), step(1), step(1)], [3, 3]),
+        ([step(0), step(0), special(0, 0), step(0)], [4]),
+        ([step(None), step(0), step(0)], [3]),
+        ([step(0), step(1), step(1), step(None)], [3, 2]),
+    ],
+)
+def test_stretches_change_where_stability_does(points: list[SimpleNamespace], lengths: list[int]):
+    """Neighbouring stretches share the point at which they meet; a start whose stability is unknown is no stretch."""
+    found = stretches(points, "height")
+    assert [len(stretch) for stretch in found] == lengths
+    for before, after in pairwise(found):
+        assert before[-1] is after[0]
+
+
+def test_a_gap_is_left_where_the_observable_is_missing():
+    gap = step(0)
+    gap.observables = {}
+    assert [len(s) for s in stretches([step(0), step(0), gap, step(0), step(0)], "height")] == [2, 2]
+
+
+def test_lines():
+    assert [_line(step(n)) for n in (0, 2, None)] == ["-", "--", ":"]
