@@ -3,11 +3,9 @@
 import json
 import math
 import shlex
-import signal
 from pathlib import Path
-from threading import current_thread, main_thread
 from time import monotonic
-from types import FrameType, TracebackType
+from types import TracebackType
 from typing import TYPE_CHECKING, Annotated, Self
 
 from cyclopts import Parameter
@@ -122,17 +120,9 @@ class ProgressDisplay:
         self._pace = Pace(until)
         self._bar: Progress | None = None
         self._told = -math.inf
-        self._interrupted = False
 
     def __enter__(self) -> Self:
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler and current_thread() is main_thread():
-            signal.signal(signal.SIGINT, self._interrupt)
         return self
-
-    def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        """Interrupt at once; where Python drops that, as in a callback of its collector, the next frame sees the note."""
-        self._interrupted = True
-        signal.default_int_handler(number, frame)
 
     def start(self, frames: int) -> None:
         """Appear: the input was good, and the store has so many frames already."""
@@ -150,15 +140,11 @@ class ProgressDisplay:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if signal.getsignal(signal.SIGINT) == self._interrupt:
-            signal.signal(signal.SIGINT, signal.default_int_handler)
         if self._bar is not None:
             self._bar.stop()
 
     def update(self, frame: "Frame", steps: int) -> None:
         """Take note of a new frame."""
-        if self._interrupted:
-            raise KeyboardInterrupt
         text = self._pace.describe(frame, steps)
         if self._bar is not None:
             task = self._bar.task_ids[0]
