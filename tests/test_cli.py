@@ -239,7 +239,6 @@ import signal
 import sys
 # A job in the background of a shell script is deaf to interrupts, and so would be its children.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-from tests.shell import Answer, Shell, one_complaint
 from tests.study.fakes import install
 install().pause = 0.02
 from shapespace.cli import main

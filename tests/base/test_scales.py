@@ -64,7 +64,9 @@ def test_length_of_the_membrane_has_its_own_symbol():
     assert Scales.of(dict.fromkeys(OPEN, 1.0)).unit("height") == "R_b"
 
 
-@given(st.tuples(*[st.floats(1e-3, 1e3)] * 4), st.floats(-1e6, 1e6))
+@given(
+    st.tuples(*[st.floats(1e-3, 1e3)] * 4), st.one_of(st.just(0.0), st.floats(1e-200, 1e6), st.floats(-1e6, -1e-200))
+)
 def test_values_survive_the_round_trip(scales: tuple[float, float, float, float], value: float):
     for name in QUANTITIES:
         there = Scales(*scales).to_dimensionless({name: value})[name]
