@@ -17,24 +17,24 @@ from benchmarks.timing import machine, use_one_core
 
 use_one_core()
 
-import time  # noqa: E402  (threads are set before the libraries load)
+import time
 
-import numpy as np  # noqa: E402
-from benchmarks.peer_auto import MISSING, STEPS, auto_directory, run_auto  # noqa: E402
-from tests.classic import at_rest, bratu  # noqa: E402
+import numpy as np
+from benchmarks.peer_auto import MISSING, STEPS, auto_directory, run_auto
+from tests.classic import at_rest, bratu
 
-from shapespace.analysis.bifurcation import Kind, SingularPoint  # noqa: E402
-from shapespace.analysis.branch import Point  # noqa: E402
-from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point  # noqa: E402
-from shapespace.analysis.extended import Parameter  # noqa: E402
-from shapespace.analysis.stability import Spectrum, solve_spectrum  # noqa: E402
-from shapespace.analysis.stationary import solve_stationary  # noqa: E402
-from shapespace.analysis.tracing import Located, traced  # noqa: E402
-from shapespace.base.arrays import Array  # noqa: E402
-from shapespace.base.problem import AbstractSmoothProblem  # noqa: E402
-from shapespace.study.engine import Engine  # noqa: E402
-from shapespace.study.keyed import KeyedProblem  # noqa: E402
-from shapespace.study.scenario import scenario  # noqa: E402
+from shapespace.analysis.bifurcation import Kind, SingularPoint
+from shapespace.analysis.branch import Point
+from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
+from shapespace.analysis.extended import Parameter
+from shapespace.analysis.stability import Spectrum, solve_spectrum
+from shapespace.analysis.stationary import solve_stationary
+from shapespace.analysis.tracing import Located, traced
+from shapespace.base.arrays import Array
+from shapespace.base.problem import AbstractSmoothProblem
+from shapespace.study.engine import Engine
+from shapespace.study.keyed import KeyedProblem
+from shapespace.study.scenario import scenario
 
 KEY, END = "ring_amplitude", 4.2
 BRATU_FOLD = 3.513830719125161

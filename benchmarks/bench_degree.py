@@ -11,17 +11,17 @@ from benchmarks.timing import machine, milliseconds, use_one_core
 
 use_one_core()
 
-import numpy as np  # noqa: E402  (threads are set before the libraries load)
+import numpy as np
 
-from shapespace.analysis.evolution import Evolution, Moment, Stepping  # noqa: E402
-from shapespace.base.problem import Rate  # noqa: E402
-from shapespace.numerics.adaptation import discretisation_error, highest_derivative  # noqa: E402
-from shapespace.numerics.collocation import CollocationProblem  # noqa: E402
-from shapespace.numerics.mesh import equidistribute, symmetrise  # noqa: E402
-from shapespace.numerics.newton import Newton, solve_root  # noqa: E402
-from shapespace.numerics.state import State, state_from_functions  # noqa: E402
-from shapespace.study.engine import Engine  # noqa: E402
-from shapespace.study.scenario import scenario  # noqa: E402
+from shapespace.analysis.evolution import Evolution, Moment, Stepping
+from shapespace.base.problem import Rate
+from shapespace.numerics.adaptation import discretisation_error, highest_derivative
+from shapespace.numerics.collocation import CollocationProblem
+from shapespace.numerics.mesh import equidistribute, symmetrise
+from shapespace.numerics.newton import Newton, solve_root
+from shapespace.numerics.state import State, state_from_functions
+from shapespace.study.engine import Engine
+from shapespace.study.scenario import scenario
 
 
 def at_degree(state: State, degree: int, mesh: np.ndarray) -> State:

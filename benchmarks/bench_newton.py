@@ -9,18 +9,18 @@ from benchmarks.timing import machine, milliseconds, use_one_core
 
 use_one_core()
 
-import numpy as np  # noqa: E402
-from scipy.linalg import solve_banded  # noqa: E402
+import numpy as np
+from scipy.linalg import solve_banded
 
-from shapespace.analysis.evolution import Evolution, Moment, Stepping  # noqa: E402
-from shapespace.base.arrays import Array  # noqa: E402
-from shapespace.base.problem import Rate  # noqa: E402
-from shapespace.numerics import condensation  # noqa: E402
-from shapespace.numerics.collocation import CollocationProblem  # noqa: E402
-from shapespace.numerics.elimination import eliminate_stages, make_plan  # noqa: E402
-from shapespace.numerics.gauss import gauss_rule  # noqa: E402
-from shapespace.study.engine import Engine  # noqa: E402
-from shapespace.study.scenario import scenario  # noqa: E402
+from shapespace.analysis.evolution import Evolution, Moment, Stepping
+from shapespace.base.arrays import Array
+from shapespace.base.problem import Rate
+from shapespace.numerics import condensation
+from shapespace.numerics.collocation import CollocationProblem
+from shapespace.numerics.elimination import eliminate_stages, make_plan
+from shapespace.numerics.gauss import gauss_rule
+from shapespace.study.engine import Engine
+from shapespace.study.scenario import scenario
 
 
 def ingressing(elements: int, degree: int) -> tuple[Engine, CollocationProblem, Array, Rate]:

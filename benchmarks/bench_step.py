@@ -22,16 +22,16 @@ from benchmarks.timing import machine, use_one_core
 
 use_one_core()
 
-import time  # noqa: E402  (threads are set before the libraries load)
+import time
 
-import numpy as np  # noqa: E402
-from benchmarks.peer_solve_bvp import TUNED, USUAL, Peer, StepResult, march  # noqa: E402
+import numpy as np
+from benchmarks.peer_solve_bvp import TUNED, USUAL, Peer, StepResult, march
 
-from shapespace.analysis.evolution import STEP_NEWTON, Evolution, Moment, Stepping  # noqa: E402
-from shapespace.base.arrays import Array  # noqa: E402
-from shapespace.numerics.collocation import CollocationProblem  # noqa: E402
-from shapespace.study.engine import Engine  # noqa: E402
-from shapespace.study.scenario import scenario  # noqa: E402
+from shapespace.analysis.evolution import STEP_NEWTON, Evolution, Moment, Stepping
+from shapespace.base.arrays import Array
+from shapespace.numerics.collocation import CollocationProblem
+from shapespace.study.engine import Engine
+from shapespace.study.scenario import scenario
 
 DT, STEPS = 1e-3, 200
 CLASSES = (1e-3, 1e-6)

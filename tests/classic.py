@@ -91,7 +91,7 @@ def start_from(
 
 def at_rest(problem: CollocationProblem) -> Array:
     """x = 0."""
-    zero = lambda u: np.zeros((len(u), problem.n))  # noqa: E731
+    zero = lambda u: np.zeros((len(u), problem.n))
     return start_from(problem, zero, zero)
 
 

@@ -156,7 +156,7 @@ def test_two_folds_of_chan():
 def test_folds_of_gelfand():
     """Three folds in the ball, their parameters and u(0); the mesh follows the spike at the pole."""
     problem = replace(gelfand(), tolerance=1e-5)
-    peak: Event = lambda point: Outcome.REACHED_END if point.x[0] > 13.0 else None  # noqa: E731
+    peak: Event = lambda point: Outcome.REACHED_END if point.x[0] > 13.0 else None
     points, outcome = follow(start(problem, [0.5], at_rest(problem)), events=[peak])
     assert outcome is Outcome.REACHED_END
     assert near(points, "fold") == pytest.approx([3.321992118, 1.664156190, 2.108541102], abs=1e-3)
@@ -232,7 +232,7 @@ CIRCLE = AlgebraicProblem(lambda x, p: x**2 + p**2 - 1.0, 1)
 def test_once_around_the_circle(direction: float):
     """x^2 + lambda^2 = 1, where the arclength is Euclidean: both folds in the right order and 2 pi around."""
     first = start(CIRCLE, [0.0], np.ones(1), direction)
-    round_trip: Event = lambda point: Outcome.REACHED_END if point.arclength > 6.25 else None  # noqa: E731
+    round_trip: Event = lambda point: Outcome.REACHED_END if point.arclength > 6.25 else None
     points, _ = follow(first, [Stop(LAMBDA, 0.0)], [round_trip])
     assert near(points, "fold") == pytest.approx([direction, -direction], abs=1e-4)
     half, whole = (point for point in points if point.label == "user")

@@ -76,9 +76,9 @@ def spectrum_at_rest(problem: CollocationProblem, p: float = 1.0, **options: int
 def bratu_state(problem: CollocationProblem, guess: float) -> Array:
     """lam = 1: u = 2 log(cosh(t)/cosh(t (1 - 2 x))), cosh(t)/t = sqrt(8), polished by Newton."""
     t = brentq(lambda t: np.cosh(t) - np.sqrt(8.0) * t, *((0.1, 1.0) if guess < 1.0 else (1.0, 5.0)))
-    value = lambda u: 2.0 * np.log(np.cosh(t) / np.cosh(t * (1.0 - 2.0 * u)))  # noqa: E731
-    slope = lambda u: 4.0 * t * np.tanh(t * (1.0 - 2.0 * u))  # noqa: E731
-    bend = lambda u: -np.exp(value(u))  # noqa: E731
+    value = lambda u: 2.0 * np.log(np.cosh(t) / np.cosh(t * (1.0 - 2.0 * u)))
+    slope = lambda u: 4.0 * t * np.tanh(t * (1.0 - 2.0 * u))
+    bend = lambda u: -np.exp(value(u))
     x = start_from(
         problem,
         lambda u: np.stack([value(u), slope(u)], axis=1),
@@ -119,7 +119,7 @@ def test_chafee_infante_at_zero(lam: float):
 
 def test_algebraic_fields_change_nothing():
     """a = 3 y as an unknown of its own: s = 3 - (n pi)^2."""
-    reaction = lambda u: jnp.full((1, 1), 3.0)  # noqa: E731
+    reaction = lambda u: jnp.full((1, 1), 3.0)
     found = spectrum_at_rest(linear(reaction, 1, algebraic=("a",)))
     assert found.converged
     np.testing.assert_allclose(found.rates, 3.0 - (np.pi * np.arange(1, 7)) ** 2, atol=1e-8)
@@ -127,7 +127,7 @@ def test_algebraic_fields_change_nothing():
 
 def test_a_constraint_with_its_multiplier():
     """Index 2: the integral of y stays, so y is sin(2 n pi u), or even with tan(k/2) = k/2; s = -k^2."""
-    reaction = lambda u: jnp.zeros((1, 1))  # noqa: E731
+    reaction = lambda u: jnp.zeros((1, 1))
     found = spectrum_at_rest(linear(reaction, 1, elements=40, scalars=("m",)))
     even = [2.0 * brentq(lambda t: np.sin(t) - t * np.cos(t), n * np.pi, (n + 0.5) * np.pi) for n in (1, 2, 3)]
     exact = -(np.sort(np.append(even, 2.0 * np.pi * np.arange(1, 4))) ** 2)

@@ -4,19 +4,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial.polynomial import polyval
 
 from shapespace.analysis.bifurcation import SingularPoint
-from shapespace.analysis.branch import Point, hermite, metric, orthogonal_plane
+from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, start_point
+from shapespace.analysis.passage import point_between
 from shapespace.analysis.singular import SingularProblem
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import Rate
-from shapespace.numerics.newton import Newton, solve_root
 
 CUSP = 1e-10
-"""Where secant steps along the curve, relative to the bracket, end the search for a cusp."""
+"""The search for a cusp ends where its bracket is this part of the first one."""
 
 
 @dataclass(frozen=True)
@@ -53,43 +51,33 @@ def fold_form(point: Point) -> float:
     return float(point.problem.form(point.x, point.p)[0, 0])
 
 
-def traced_curve(curve: Continuation, newton: Newton = Newton(tolerance=1e-10)) -> Iterator[Point | Cusp]:
+def traced_curve(curve: Continuation) -> Iterator[Point | Cusp]:
     """The points of a curve of folds, each after the cusp that lies before it."""
     last, form = curve.past[-1], fold_form(curve.past[-1])
     for point in curve:
         next_form = fold_form(point)
         if form * next_form < 0.0:
-            found = locate_cusp(last, point, newton)
+            found = locate_cusp(last, point)
             if found is not None:
                 yield found
         yield point
         last, form = point, next_form
 
 
-def locate_cusp(before: Point, after: Point, newton: Newton = Newton(tolerance=1e-10)) -> Cusp | None:
+def locate_cusp(before: Point, after: Point) -> Cusp | None:
     """The cusp between two neighbours on a curve of folds, by the Illinois method along it; None where Newton fails."""
-    system = after.problem
-    assert isinstance(system, SingularProblem)
-    start = before.on(system)
-    length = after.arclength - before.arclength
-    cubic = hermite(start.joined, start.tangent, after.joined, after.tangent, length)
-    row = metric(system, after.joined) * (after.joined - start.joined)
-    rate = Rate.of_growth(system.stored(after.x, after.p))
-    low, high = (0.0, fold_form(before)), (length, fold_form(after))
+    at_start = fold_form(before)
+    low, high = (0.0, at_start), (1.0, fold_form(after))
+    place = after
     for _ in range(60):
-        s = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
-        guess = np.asarray(polyval(s, cubic))
-        plane = orthogonal_plane(start, row, guess)
-        root = solve_root(plane, guess, after.p, rate, newton)
-        if root.outcome is not Outcome.CONVERGED:
+        share = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
+        found = point_between(before, after, share)
+        if found is None:
             return None
-        x, p = plane.split(root.x, after.p)
-        form = float(system.form(x, p)[0, 0])
-        if form * high[1] < 0.0:
-            low, high = high, (s, form)
-        else:
-            low, high = (low[0], 0.5 * low[1]), (s, form)
-        if abs(high[0] - low[0]) <= CUSP * length or form == 0.0 or abs(form) <= 1e-12 * abs(fold_form(before)):
+        place, form = found, fold_form(found)
+        low, high = (high if form * high[1] < 0.0 else (low[0], 0.5 * low[1])), (share, form)
+        if abs(high[0] - low[0]) <= CUSP or abs(form) <= 1e-12 * abs(at_start):
             break
-    full = system.parameters(x, p)
-    return Cusp(float(full[system.index]), float(p[after.index]), system.state(x), full)
+    assert isinstance(place.problem, SingularProblem)
+    full = parameters_at(place)
+    return Cusp(float(full[place.problem.index]), place.parameter, place.problem.state(place.x), full)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
+from shapespace.analysis.bifurcation import SAFETY
 from shapespace.analysis.branch import Point, hermite, metric, orthogonal_plane
 from shapespace.analysis.stability import Spectrum
 from shapespace.base.problem import AbstractSmoothProblem, Rate
@@ -17,8 +18,6 @@ BISECTIONS = 16
 HOPF_STEPS = 12
 ON_AXIS = 1e-9
 """A pair's real part below this, relative to its frequency, is zero: as exact as spectra are."""
-SAFETY = 2.0
-"""Of the parameter's error, over its change on a finer mesh."""
 
 SpectrumOf = Callable[[Point], Spectrum]
 
