@@ -31,8 +31,9 @@ def test_steady_prints_a_state_with_its_growth_rates(shell: Shell):
 def test_steady_says_where_it_got_to_and_what_is_wrong(shell: Shell):
     answer = shell("steady", "polar-swimmer", "-s", "elements=20", "peclet=15", "--json")
     record = json.loads(answer.out, parse_constant=pytest.fail)
-    assert (answer.status, record["outcome"], record["observables"]) == (3, "not-reached", {})
+    assert (answer.status, record["outcome"], record["observables"]) == (3, "no-state", {})
     assert 0.0 <= record["residual"] < 1e-3
+    assert "polarizes at peclet = 22; the branch from there comes to no swimmer at 15" in answer.err
     assert "best residual" in answer.err
     Path("foreign").mkdir()
     Path("foreign/thesis.tex").write_text("precious")
@@ -64,6 +65,8 @@ def test_branch_reports_special_points(shell: Shell):
     assert [point["n_unstable"] for point in record["points"]] == [int(p["parameter"] > 22.0) for p in record["points"]]
     assert record["points"][0]["observables"]["area"] == pytest.approx(4.0 * np.pi)
     assert "n_unstable 0 pitchfork-1" in answer.err
+    assert record["began"] == "trivial"
+    assert "start from the state trivial" in answer.err
     again = shell(*BRANCH, "--stop", "23", "--at", "21.5", "--resume", "--out", "sphere")
     assert "pitchfork-1" in again.out
     assert shell("plot", "sphere") == (0, "sphere/figure.png\n", "")
@@ -76,7 +79,7 @@ def test_branch_without_a_start_says_how_near_it_came(shell: Shell):
     command = ("branch", *BRANCH[1:6], "--state", "default", "--start", "15", "--stop", "16", "--out", "none")
     answer = shell(*command, "--json")
     record = json.loads(answer.out, parse_constant=pytest.fail)
-    assert (answer.status, record["outcome"], record["points"]) == (3, "not-reached", [])
+    assert (answer.status, record["outcome"], record["points"]) == (3, "no-state", [])
     assert "best residual" in answer.err
 
 

@@ -57,7 +57,7 @@ def test_the_swimmer_just_beyond_its_pitchfork():
 def test_below_the_pitchfork_there_is_no_swimmer():
     """The search says so, with the parameters it got to, and does not pass off the sphere as a swimmer."""
     steady = solve_steady(scenario("polar-swimmer", elements=20, peclet=15.0))
-    assert steady.outcome is Outcome.NOT_REACHED
+    assert steady.outcome is Outcome.NO_STATE
 
 
 def test_conserved_regulator_is_refused():

@@ -19,6 +19,7 @@ class Outcome(StrEnum):
     MAX_STEPS = "max-steps"
     REACHED_STOP = "reached-stop"
     NOT_REACHED = "not-reached"
+    NO_STATE = "no-state"
     BRANCH_STALLED = "branch-stalled"
     EIGENVALUES_UNCONVERGED = "eigenvalues-unconverged"
 
@@ -58,6 +59,9 @@ _ADVICE = {
     Outcome.REACHED_STOP: "The branch came to a value where it was to end.",
     Outcome.NOT_REACHED: (
         "Stepping stalled on the way to these parameters: there may be no such state, or a fold lies between; follow the branch."
+    ),
+    Outcome.NO_STATE: (
+        "No state of this name was found at these parameters: choose others, or another --state (trivial is everywhere)."
     ),
     Outcome.BRANCH_STALLED: (
         "The step along the branch fell below its minimum: the branch may end here; if not, refine the mesh or loosen tolerances."

@@ -140,7 +140,8 @@ class _Display:
         if point.label or now - self._told >= self._pause:
             self._told = now
             growing = "" if point.n_unstable is None else f", n_unstable {point.n_unstable}"
-            tell(f"{count} points, {self._key} = {point.parameter:.8g}{growing} {point.label}".rstrip())
+            began = f" from the state {point.began}" if point.began else ""
+            tell(f"{count} points, {self._key} = {point.parameter:.8g}{growing} {point.label}{began}".rstrip())
 
 
 def _record(found: "Branch") -> dict[str, Any]:
@@ -151,6 +152,7 @@ def _record(found: "Branch") -> dict[str, Any]:
         **described(found.outcome, found.scenario, last),
         "store": str(found.store),
         "vary": found.key,
+        "began": found.began,
         "special_points": [
             {
                 "label": point.label,
@@ -188,4 +190,5 @@ def _summarise(found: "Branch") -> None:
         table.add_row(point.label, f"{point.parameter:.10g}", f"{point.parameter_error:.1g}", *counts, rate)
     assert found.outcome is not None
     count = sum(point.is_step for point in found.points)
-    print_lines(table, f"{found.outcome}: {found.outcome.advice}", f"{count} points; stored in {found.store}")
+    began = f" from the state {found.began}" if found.began else ""
+    print_lines(table, f"{found.outcome}: {found.outcome.advice}", f"{count} points{began}; stored in {found.store}")

@@ -23,7 +23,7 @@ class BranchPoint:
     errors (m,), parities and names of neutral ones by place; modes (m, n), of labelled points only. n_unstable: None where
     unknown. label, kind: of special points, else empty. is_step: one of the continuation's own points, not one located
     between them. ends: outcome with which the leg ends here, else empty. missed: brackets before this point in which nothing
-    was found.
+    was found. began: of the first point, the name of the state, or the store, that it comes from.
     """
 
     frame: Frame
@@ -49,6 +49,7 @@ class BranchPoint:
     is_step: bool = True
     ends: str = ""
     missed: tuple[dict[str, Any], ...] = ()
+    began: str = ""
 
     @property
     def observables(self) -> dict[str, float]:
@@ -65,7 +66,7 @@ _NUMBERS = ("parameter", "parameter_error", "arclength", "step", "sign", "next_s
 _ARRAYS = ("tangent", "directions", "growth_rates", "growth_rate_errors", "modes")
 _WORDS = (
     "parities", "neutral", "n_unstable", "n_unstable_before", "n_unstable_after", "leg", "label", "kind", "is_step", "ends",
-    "missed",
+    "missed", "began",
 )  # fmt: skip
 
 

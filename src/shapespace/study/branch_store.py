@@ -85,6 +85,11 @@ class Branch:
         return tuple(point for point in self.points if point.label and point.label != START)
 
     @property
+    def began(self) -> str:
+        """What the branch began at: the name of a state, or a stored one as `STORE:LABEL`; empty where it did not begin."""
+        return next((point.began for point in self.points if point.label == START), "")
+
+    @property
     def missed(self) -> tuple[dict[str, Any], ...]:
         """Brackets between neighbours in which something lies that was not found."""
         return tuple(one for point in self.points for one in point.missed)

@@ -195,7 +195,7 @@ def _follow(
             first = _start(scenario, request, known)
             if isinstance(first, _End):
                 return first
-            record(surveyor.start(first))
+            record(surveyor.start(*first))
         ended = next((Outcome(point.ends) for point in done if point.leg == leg and point.ends), None)
         if ended not in ENDS:
             past = _past(surveyor, done, leg)
@@ -236,36 +236,52 @@ def _leg(
         yield surveyor.end(last, last, surveyor.outcome)
 
 
-def _start(scenario: Scenario, request: Request, known: Start | None) -> Point | _End:
-    """The first point, its tangent towards the stop, or along the chosen side."""
-    options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
-    if known is not None and known.point is not None and known.key == request.key and _is_at(known, scenario):
-        problem, place = _placed(scenario, request.key, known.point)
-        if request.side:
-            return side_branches(_singular(known.point, problem, place), known.point.tangent, FIRST_STEP)[
-                0 if request.side > 0 else 1
-            ]
-        rising = place.tangent[-1] * request.direction
-        tangent = place.tangent if rising >= 0.0 else -place.tangent
-        return _begun(start_point(problem, place.x, place.p, 0, request.direction, options, tangent))
-    found = _named(scenario, request.state) if known is None else steady_near(scenario, known)
+def _start(scenario: Scenario, request: Request, known: Start | None) -> tuple[Point, str] | _End:
+    """The first point, its tangent towards the stop or along the chosen side, and the name of the state it is."""
+    if known is None:
+        name, found = _named(scenario, request.state)
+    elif (first := _stored_start(scenario, request, known)) is not None:
+        return first if isinstance(first, _End) else (first, known.text)
+    else:
+        name, found = known.text, steady_near(scenario, known)
     if not found.outcome.is_success:
         return _End(found.outcome, f"No state to start from: {found.nearest}")
-    return _begun(_start_at(found, request, options))
+    first = _begun(_start_at(found, request))
+    return first if isinstance(first, _End) else (first, name)
+
+
+def _stored_start(scenario: Scenario, request: Request, known: Start) -> Point | _End | None:
+    """The stored point itself, if it is one of a branch in this key of this very scenario."""
+    options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
+    if known.point is None or known.key != request.key or not _is_at(known, scenario):
+        return None
+    problem, place = _placed(scenario, request.key, known.point)
+    if request.side:
+        return side_branches(_singular(known.point, problem, place), known.point.tangent, FIRST_STEP)[
+            0 if request.side > 0 else 1
+        ]
+    rising = place.tangent[-1] * request.direction
+    tangent = place.tangent if rising >= 0.0 else -place.tangent
+    return _begun(start_point(problem, place.x, place.p, 0, request.direction, options, tangent))
 
 
 def _begun(first: Point | Outcome) -> Point | _End:
     return _End(first, "The start has no single direction to go on in.") if isinstance(first, Outcome) else first
 
 
-def _named(scenario: Scenario, state: str | None) -> Steady:
-    """The state of this name; without a name the default one where there is one, else the trivial one."""
-    found = steady(scenario, state=state or StateName.DEFAULT)
-    return steady(scenario, state=StateName.TRIVIAL) if state is None and not found.outcome.is_success else found
+def _named(scenario: Scenario, state: str | None) -> tuple[str, Steady]:
+    """The state of this name; without a name the default one where there is one, else the trivial one. With its name."""
+    name = state or StateName.DEFAULT
+    found = steady(scenario, state=name)
+    if state is None and not found.outcome.is_success:
+        name = StateName.TRIVIAL
+        found = steady(scenario, state=name)
+    return str(name), found
 
 
-def _start_at(found: Steady, request: Request, options: Arclength) -> Point | Outcome:
+def _start_at(found: Steady, request: Request) -> Point | Outcome:
     """The first point at a solution."""
+    options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
     problem = replace(KeyedProblem.of(found.scenario, (request.key,)), base=found.problem.base)
     return start_point(problem, found.found.x, np.array([request.start]), 0, request.direction, options)
 

@@ -66,9 +66,9 @@ class Surveyor:
         self._last = self._near = self._spectrum_of(done[steps[-1]])
         self._stored = len([point for point in done[steps[-1] + 1 :] if point.leg == leg])
 
-    def start(self, point: Point) -> BranchPoint:
+    def start(self, point: Point, began: str) -> BranchPoint:
         """The record of the first point."""
-        return self._record(point, self._spectrum(point), label=START, kind=START)
+        return self._record(point, self._spectrum(point), label=START, kind=START, began=began)
 
     def step(self, point: Point) -> BranchPoint:
         """The record of a point that continuation came to."""

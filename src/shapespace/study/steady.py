@@ -70,11 +70,15 @@ class Rates:
 
 @dataclass(frozen=True)
 class Steady:
-    """A stationary state of a scenario, or why there is none: `found.outcome`, with the best state met."""
+    """A stationary state of a scenario, or why there is none: `found.outcome`, with the best state met.
+
+    detail: in words, what a search for a named state met.
+    """
 
     scenario: Scenario
     problem: KeyedProblem
     found: Stationary
+    detail: str = ""
 
     @property
     def outcome(self) -> Outcome:
@@ -108,7 +112,7 @@ class Steady:
     def nearest(self) -> str:
         """Where a search ended, in words."""
         reached = ", ".join(f"{key} = {value:.8g}" for key, value in self.reached.items())
-        return f"best residual {self.found.residual:.2g} at {reached}."
+        return " ".join(filter(None, [f"best residual {self.found.residual:.2g} at {reached}.", self.detail]))
 
     @property
     def frame(self) -> Frame:
@@ -210,22 +214,20 @@ def follow(start: Steady, key: str, value: float) -> Steady:
     first = start_point(problem, start.found.x, at, 0, float(np.sign(value - at[0])), _steps(value - at[0]))
     if isinstance(first, Outcome):
         return replace(start, found=replace(start.found, outcome=first))
-    return _along(scenario, first, value)
+    return _steady(scenario, _along(first, value, _steps(value - first.parameter)))
 
 
-def _along(scenario: Scenario, first: Point, value: float) -> Steady:
-    """The end of the branch from a point to a value of its parameter."""
-    branch = Continuation(
-        [first], [Stop(Parameter(0), value, "end", ends=True)], _steps(value - first.parameter), NEWTON
-    )
+def _along(first: Point, value: float, options: Arclength, away: float | None = None) -> Stationary:
+    """The state where the branch from a point comes to a value of its parameter; NO_STATE where it comes to `away` first."""
+    stops = [Stop(Parameter(0), one, "end", ends=True) for one in (value, away) if one is not None]
+    branch = Continuation([first], stops, options, NEWTON)
     *_, last = [first, *branch]
-    if branch.outcome is not Outcome.REACHED_STOP:
-        still = Rate.of_growth(last.problem.stored(last.x, last.p))
-        residual = float(np.abs(last.problem.residual(last.x, last.p, still)).max())
-        found = Stationary(last.problem, last.x, last.p, Outcome.NOT_REACHED, np.nan, residual, 0, False)
-    else:
-        found = solve_stationary(last.problem, last.x, last.p, NEWTON)
-    return _steady(scenario, found)
+    if branch.outcome is Outcome.REACHED_STOP and last.parameter == value:
+        return solve_stationary(last.problem, last.x, last.p, NEWTON)
+    outcome = Outcome.NO_STATE if branch.outcome is Outcome.REACHED_STOP else Outcome.NOT_REACHED
+    still = Rate.of_growth(last.problem.stored(last.x, last.p))
+    residual = float(np.abs(last.problem.residual(last.x, last.p, still)).max())
+    return Stationary(last.problem, last.x, last.p, outcome, np.nan, residual, 0, False)
 
 
 def _steps(span: float) -> Arclength:
@@ -256,17 +258,28 @@ def _raised(scenario: Scenario, start: Steady, keys: Sequence[str]) -> Steady:
 
 
 def _polarized(scenario: Scenario, sphere: Scenario) -> Steady:
-    """The swimming state on the branch that leaves the sphere at its first pitchfork in the Peclet number."""
+    """The swimming state on the branch that leaves the sphere at its first pitchfork in the Peclet number.
+
+    Below the pitchfork that branch leads to a swimmer only if it turns back: it is followed to twice the pitchfork's number,
+    above it as far back as zero, where nothing drives a flow.
+    """
     goal = float(scenario.values()["peclet"])
     resting = _sphere(sphere.with_overrides({"peclet": 0.0}), sphere.with_overrides({"peclet": 0.0}))
     first = start_point(resting.problem, resting.found.x, np.zeros(1), 0, 1.0, _steps(1.0))
     assert isinstance(first, Point)
     branch = Continuation([first], (), Arclength(first=0.1, largest=0.2, max_points=MAX_POINTS), NEWTON)
+    reached = 0.0
     for one in traced(branch):
+        reached = one.parameter if isinstance(one, Point) else reached
         if isinstance(one, Located) and one.point.kind is Kind.PITCHFORK:
+            fork = one.point.parameter
             side = side_branches(one.point, one.bracket.after.tangent, 0.02)[0]
-            return _along(scenario, side, goal)
-    return replace(resting, found=replace(resting.found, outcome=Outcome.NOT_REACHED))
+            away = 2.0 * fork if goal < fork else 0.0
+            found = _along(side, goal, _steps(max(abs(goal - fork), 0.1 * fork)), away)
+            met = f"The sphere polarizes at peclet = {fork:.8g}; the branch from there comes to no swimmer at {goal:g}."
+            return replace(_steady(scenario, found), detail="" if found.outcome.is_success else met)
+    detail = f"The sphere does not polarize up to peclet = {reached:.3g}."
+    return replace(resting, found=replace(resting.found, outcome=Outcome.NO_STATE), detail=detail)
 
 
 def _check_has_isolated_states(scenario: Scenario) -> None:
