@@ -9,7 +9,7 @@ from shapespace.analysis.singular import SingularProblem, probe
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractProblem, AbstractSmoothProblem, Border, Rate
-from shapespace.numerics.newton import Newton, solve_root
+from shapespace.numerics.newton import Newton, Root, solve_root
 
 LOCATION = Newton(tolerance=1e-10, max_iterations=30)
 LARGEST_GAP = 1e-3
@@ -60,11 +60,11 @@ def locate_fold(
     problem: AbstractSmoothProblem, index: int, x: Array, p: Array, tangent: Array
 ) -> SingularPoint | Outcome:
     """The fold near (x, p), where the branch has the tangent dx (n,); an Outcome says why there is none."""
-    start = SingularProblem(problem, index, _unit_vectors(problem, x, tangent[None]))
-    root = solve_root(start, np.append(x, p[index]), p, _rest(problem, x, p), LOCATION)
+    kernel = _unit_vectors(problem, x, tangent[None])
+    root = solve_singular(problem, index, x, p, kernel)
     if root.outcome is not Outcome.CONVERGED:
         return root.outcome
-    final = start.with_kernel(root.x, p)
+    final = SingularProblem(problem, index, kernel).with_kernel(root.x, p)
     at = final.parameters(root.x, p)
     directions = np.append(final.kernel[0], 0.0)[None]
     error = _parameter_error(final, root.x, p)
@@ -75,11 +75,11 @@ def locate_branch_point(
     problem: AbstractSmoothProblem, index: int, x: Array, p: Array, tangent: Array
 ) -> SingularPoint | Outcome:
     """The branch point near (x, p), where one branch has the unit tangent (dx, dparameter) (n + 1,)."""
-    start = SingularProblem(problem, index, np.stack([tangent, second_direction(problem, index, x, p, tangent)]))
-    root = solve_root(start, np.append(x, [p[index], 0.0]), p, _rest(problem, x, p), LOCATION)
+    kernel = np.stack([tangent, second_direction(problem, index, x, p, tangent)])
+    root = solve_singular(problem, index, x, p, kernel)
     if root.outcome is not Outcome.CONVERGED:
         return root.outcome
-    final = start.with_kernel(root.x, p)
+    final = SingularProblem(problem, index, kernel).with_kernel(root.x, p)
     form = final.form(root.x, p)
     if 2.0 * abs(root.x[-1]) > LARGEST_GAP**2 * np.abs(form).max():
         return Outcome.DIVERGED
@@ -90,6 +90,16 @@ def locate_branch_point(
     tilts = np.abs(directions[:, -1]) / max(abs(at[index]), 1.0)
     kind = Kind.PITCHFORK if tilts.min() < TILT else Kind.TRANSCRITICAL
     return SingularPoint(kind, problem, index, final.state(root.x), at, error, final.kernel, directions)
+
+
+def solve_singular(problem: AbstractSmoothProblem, index: int, x: Array, p: Array, kernel: Array) -> Root:
+    """Newton on the defining system from a known fold, kernel (1, n), or branch point, kernel (2, n + 1), near (x, p).
+
+    Where F_x is singular Newton on F alone creeps or leaves. The root holds x, p[index] and, of a branch point, the unfolding.
+    """
+    start = SingularProblem(problem, index, kernel)
+    guess = np.append(x, [p[index], 0.0][: len(kernel)])
+    return solve_root(start, guess, p, _rest(problem, x, p), LOCATION)
 
 
 def second_direction(problem: AbstractSmoothProblem, index: int, x: Array, p: Array, tangent: Array) -> Array:

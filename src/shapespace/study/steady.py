@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from shapespace.analysis.bifurcation import Kind
+from shapespace.analysis.bifurcation import Kind, solve_singular
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
 from shapespace.analysis.extended import Parameter
@@ -166,7 +166,7 @@ def steady_near(scenario: Scenario, start: Start) -> Steady:
     keys = tuple(key for key, value in mine.items() if theirs[key] != value)
     state = state_of(start.frame)
     if not keys:
-        return steady_from(scenario, state)
+        return _singular_at(scenario, start) or steady_from(scenario, state)
     origin = scenario.with_overrides({key: theirs[key] for key in keys})
     settled = steady_from(origin, state, keys)
     if not settled.outcome.is_success:
@@ -174,6 +174,25 @@ def steady_near(scenario: Scenario, start: Start) -> Steady:
     found = step_to(settled.found, key_values(scenario, keys))
     return _steady(
         scenario, solve_stationary(found.problem, found.x, found.p, NEWTON) if found.outcome.is_success else found
+    )
+
+
+def _singular_at(scenario: Scenario, start: Start) -> Steady | None:
+    """A stored fold or branch point as the solution of its defining system; None for other states, and on other meshes."""
+    point = start.point
+    if point is None or start.key is None or point.kind not in (*Kind,) or start.scenario.numerics != scenario.numerics:
+        return None
+    problem = KeyedProblem.of(scenario, (start.key,))
+    problem = replace(problem, base=problem.base.on_mesh(point.frame.mesh))
+    x, p = problem.base.pack(state_of(point.frame)), np.array([point.parameter])
+    root = solve_singular(problem, 0, x, p, point.tangent[None, :-1] if point.kind == Kind.FOLD else point.directions)
+    if not root.outcome.is_success:
+        return None
+    x, p = root.x[: len(x)], root.x[len(x) : len(x) + 1]
+    residual = float(np.abs(problem.residual(x, p, Rate.of_growth(problem.stored(x, p)))).max())
+    settled = problem.adapted(x) is problem
+    return _steady(
+        scenario, Stationary(problem, x, p, root.outcome, root.correction, residual, root.iterations, settled)
     )
 
 
