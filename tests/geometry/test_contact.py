@@ -3,43 +3,56 @@
 import numpy as np
 import pytest
 
-from shapespace.geometry.contact import self_crossing
+from shapespace.base.arrays import Array
+from shapespace.geometry.contact import Outline, crosses_itself
+
+U = np.linspace(0.0, 1.0, 240)
 
 
-def outline(overlap: float, points: int = 400) -> tuple[np.ndarray, np.ndarray]:
-    """A bud on a neck as a curve whose neck radius is -overlap at its narrowest: r = sin(t) (1 + ...) pinched at the middle."""
-    t = np.linspace(0.0, np.pi, points)
-    return np.sin(t) * (np.cos(t) ** 2 - overlap), 2.0 * np.cos(t)
+def pinched(overlap: float) -> Outline:
+    """A bud on a neck whose radius is -overlap at its narrowest."""
+    return lambda u: (np.sin(np.pi * u) * (np.cos(np.pi * u) ** 2 - overlap), 2.0 * np.cos(np.pi * u))
+
+
+def lips(gap: float) -> Outline:
+    """Two lips that touch at t = -1 and 1 where the gap vanishes: z = t ((t^2 - 1)^2 + gap), r = 3 + t^2."""
+
+    def outline(u: Array) -> tuple[Array, Array]:
+        t = 3.0 * u - 1.5
+        return 3.0 + t**2, t * ((t**2 - 1.0) ** 2 + gap)
+
+    return outline
 
 
 @pytest.mark.parametrize("radius", [1e-3, 1.0, 1e3])
 def test_spheres_and_discs_are_simple(radius: float):
-    angle = np.linspace(0.0, np.pi, 300)
-    assert self_crossing(radius * np.sin(angle), radius * np.cos(angle)) is None
-    assert self_crossing(np.linspace(0.0, radius, 50), np.zeros(50)) is None
+    assert not crosses_itself(lambda u: (radius * np.sin(np.pi * u), radius * np.cos(np.pi * u)), U)
+    assert not crosses_itself(lambda u: (radius * u, 0.0 * u), U)
 
 
 @pytest.mark.parametrize("overlap", [-0.1, -1e-3])
 def test_a_thin_neck_is_no_contact(overlap: float):
-    assert self_crossing(*outline(overlap)) is None
+    assert not crosses_itself(pinched(overlap), U)
 
 
 @pytest.mark.parametrize("overlap", [1e-3, 0.1])
 def test_a_neck_through_the_axis_is_found(overlap: float):
-    found = self_crossing(*outline(overlap))
-    assert found is not None
-    assert found[0] == found[1]
+    assert crosses_itself(pinched(overlap), U)
+
+
+@pytest.mark.parametrize("gap", [0.1, 1e-3, 1e-6])
+def test_first_contact_is_seen_far_below_the_distance_of_samples(gap: float):
+    assert not crosses_itself(lips(gap), U)
+    assert crosses_itself(lips(-gap), U)
 
 
 @pytest.mark.parametrize(("width", "crosses"), [(0.5, False), (1.05, False), (1.3, True), (1.6, True)])
 def test_an_omega_that_closes_its_mouth_crosses_itself(width: float, crosses: bool):
     """A stomatocyte's mouth: an arc of a torus section that turns by more than a full circle meets its own start."""
-    turn = np.linspace(-np.pi * width, np.pi * width, 401)
-    grow = 1.0 + 0.02 * np.abs(turn)
-    r, z = 3.0 + grow * np.cos(turn), np.sin(turn) * grow + 0.1 * turn
-    found = self_crossing(r, z)
-    assert (found is not None) == crosses
-    if found is not None:
-        i, j = found
-        gap = np.hypot(r[i] - r[j], z[i] - z[j])
-        assert gap < 2.0 * np.hypot(np.diff(r), np.diff(z)).max()
+
+    def outline(u: Array) -> tuple[Array, Array]:
+        turn = np.pi * width * (2.0 * u - 1.0)
+        grow = 1.0 + 0.02 * np.abs(turn)
+        return 3.0 + grow * np.cos(turn), np.sin(turn) * grow + 0.1 * turn
+
+    assert crosses_itself(outline, U) == crosses

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 import shapespace as ss
+from shapespace.analysis.branch import Point
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.numerics.newton import solve_root
+from shapespace.study import branching
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.steady import NEWTON
@@ -138,6 +140,23 @@ def test_both_ways_from_the_start():
     assert values == sorted(values)
     assert (values[0], values[-1]) == (18.0, 24.0)
     assert [point.label for point in found.special_points] == ["end-2", "pitchfork-1", "end-1"]
+
+
+def test_a_branch_ends_where_the_surface_first_touches_itself(monkeypatch: pytest.MonkeyPatch):
+    """Located between a shape that does not cross itself and one that does; here those beyond Pe = 21.3 are said to."""
+
+    def crossing(point: Point) -> Outcome | None:
+        return Outcome.SELF_INTERSECTING if point.parameter > 21.3 else None
+
+    monkeypatch.setattr(branching, "physical_end", crossing)
+    case = ss.scenario("polar-swimmer", **SWIMMER)
+    found = ss.branch(case, "peclet", 30.0, start=21.0, state="trivial", stability=False)
+    assert found.outcome is Outcome.SELF_CONTACT
+    assert found.outcome.is_success
+    contact = found["self-contact-1"]
+    assert 0.0 <= 21.3 - contact.parameter <= contact.parameter_error < 1e-3
+    begun = ss.branch(case, "peclet", 30.0, start=22.0, state="trivial", stability=False)
+    assert [point.label for point in begun.points] == ["start", "self-intersecting-1"]
 
 
 def cut(store: Path, path: Path, kept: int) -> Path:

@@ -10,6 +10,7 @@ class Outcome(StrEnum):
     STATIONARY = "stationary"
     REACHED_END = "reached-end"
     NECK_CLOSED = "neck-closed"
+    SELF_CONTACT = "self-contact"
     SELF_INTERSECTING = "self-intersecting"
     MAX_ITERATIONS = "max-iterations"
     DIVERGED = "diverged"
@@ -39,6 +40,7 @@ _SUCCESS = {
     Outcome.STATIONARY,
     Outcome.REACHED_END,
     Outcome.NECK_CLOSED,
+    Outcome.SELF_CONTACT,
     Outcome.SELF_INTERSECTING,
     Outcome.REACHED_STOP,
 }
@@ -48,7 +50,8 @@ _ADVICE = {
     Outcome.STATIONARY: "Shape, flow and concentrations no longer change.",
     Outcome.REACHED_END: "The end time was reached; raise `until` or resume to go on.",
     Outcome.NECK_CLOSED: "The neck became thinner than the closing radius: beyond it the surface would split.",
-    Outcome.SELF_INTERSECTING: "The surface passes through itself from here on: shapes beyond are no physical ones.",
+    Outcome.SELF_CONTACT: "The surface touches itself: shapes beyond would pass through themselves.",
+    Outcome.SELF_INTERSECTING: "The surface passes through itself already at the start: choose another one.",
     Outcome.MAX_ITERATIONS: "Newton ran out of iterations: start from a nearer state or take a smaller step.",
     Outcome.DIVERGED: "Newton could not reduce the residual: start from a nearer state or take a smaller step.",
     Outcome.SINGULAR: "The linear system is singular: an unknown is left free or a condition is repeated.",

@@ -26,7 +26,7 @@ from shapespace.study.starts import Start, find_start
 from shapespace.study.steady import StateName, Steady, key_values, steady, steady_near
 
 FIRST_STEP = 0.02
-ENDS = (Outcome.REACHED_STOP, Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING)
+ENDS = (Outcome.REACHED_STOP, Outcome.NECK_CLOSED, Outcome.SELF_CONTACT, Outcome.SELF_INTERSECTING)
 """A leg that came to one of these is complete."""
 
 
@@ -225,7 +225,9 @@ def _leg(
         if end is not None:
             inside, outside = first_change(last, point, lambda place: physical_end(place) is not None)
             yield from surveyor.between(last, point, inside.arclength)
-            surveyor.outcome = end = physical_end(outside) or end
+            end = physical_end(outside) or end
+            # The last shape that does not pass through itself is, to the accuracy of the bisection, the first that touches.
+            surveyor.outcome = end = Outcome.SELF_CONTACT if end is Outcome.SELF_INTERSECTING else end
             yield surveyor.end(inside, outside, end)
             return
         yield from surveyor.between(last, point)

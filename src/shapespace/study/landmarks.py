@@ -10,8 +10,9 @@ from shapespace.analysis.branch import Point, metric
 from shapespace.analysis.passage import Hopf, growing_pairs, locate_hopf
 from shapespace.analysis.stability import Disc, Spectrum, solve_spectrum
 from shapespace.analysis.tracing import Located, Missed, singular_points
+from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.geometry.contact import self_crossing
+from shapespace.geometry.contact import crosses_itself
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
 from shapespace.study.keyed import KeyedProblem
@@ -37,12 +38,18 @@ def physical_end(point: Point) -> Outcome | None:
     if neck is not None and neck < CLOSING_RADIUS:
         return Outcome.NECK_CLOSED
     places = np.arange(OUTLINE * base.elements + 1) / OUTLINE
-    outline = state.values(np.interp(places, np.arange(base.elements + 1), state.mesh))
-    radii, heights = outline[:, r], outline[:, fields.index("z")]
+    u = np.interp(places, np.arange(base.elements + 1), state.mesh)
+    z = fields.index("z")
+
+    def outline(u: Array) -> tuple[Array, Array]:
+        values = state.values(u)
+        return values[:, r], values[:, z]
+
+    radii, heights = outline(u)
     # An outline that only falls and stays on its side of the axis cannot cross itself.
     if (np.diff(heights) < 0.0).all() and radii.min() >= 0.0:
         return None
-    return None if self_crossing(radii, heights) is None else Outcome.SELF_INTERSECTING
+    return Outcome.SELF_INTERSECTING if crosses_itself(outline, u) else None
 
 
 class Surveyor:
