@@ -1,4 +1,4 @@
-"""The classic benchmarks (references/continuation.md, rows 1-8): singular points on whole branches, named and located to 1e-9."""
+"""The classic benchmarks (references/continuation.md, rows 1-9): singular points on whole branches, named and located to 1e-9."""
 
 from collections.abc import Sequence
 
@@ -13,10 +13,12 @@ from tests.classic import (
     carrier,
     chafee_infante,
     chan,
+    circle,
     gelfand,
     mean_free,
     middle,
     neumann_bratu,
+    ring,
     start_from,
 )
 
@@ -168,3 +170,24 @@ def test_row_6_carrier():
     for value in values:
         assert np.abs(known - value).min() < 1e-9
     assert points[-1].parameter == 0.22
+
+
+def test_row_9_the_elastic_ring():
+    """The circle buckles at p = n^2 - 1 = 3, 8, 15 (pitchforks of revolution), and two-lobed rings touch at p = 5.24688696.
+
+    Where sides touch nothing is transmitted across the ring but k^2/2 - s at the contact, with k = -1 and s = 1/2 there.
+    """
+    problem = ring(80)
+    _, located = branch_from(problem, circle(problem, 0.5), [0.5], 0, 16.0, first=0.1)
+    check(located, [(Kind.PITCHFORK, n**2 - 1.0) for n in (2, 3, 4)])
+    touching = 5.24688696
+    for start in side_branches(located[0].point, located[0].bracket.after.tangent, 0.05):
+        points, special = follow(start, 0, touching)
+        assert all(abs(one.point.parameter - 3.0) < 1e-9 for one in special)  # where it starts
+        end = points[-1]
+        assert isinstance(end.problem, CollocationProblem)
+        state = end.problem.unpack(end.x)
+        tension, multiplier = state.scalars
+        assert abs(multiplier) < 1e-10
+        assert tension == pytest.approx(0.5, abs=2e-8)
+        assert state.values(np.linspace(0.0, 1.0, 9))[:, 0].min() == pytest.approx(-1.0, abs=2e-8)

@@ -22,6 +22,8 @@ class Outcome(StrEnum):
     NOT_REACHED = "not-reached"
     NO_STATE = "no-state"
     BRANCH_STALLED = "branch-stalled"
+    REPEATED = "repeated"
+    NO_MORE_FOUND = "no-more-found"
     EIGENVALUES_UNCONVERGED = "eigenvalues-unconverged"
 
     @property
@@ -43,6 +45,7 @@ _SUCCESS = {
     Outcome.SELF_CONTACT,
     Outcome.SELF_INTERSECTING,
     Outcome.REACHED_STOP,
+    Outcome.NO_MORE_FOUND,
 }
 
 _ADVICE = {
@@ -68,6 +71,10 @@ _ADVICE = {
     ),
     Outcome.BRANCH_STALLED: (
         "The step along the branch fell below its minimum: the branch may end here; if not, refine the mesh or loosen tolerances."
+    ),
+    Outcome.REPEATED: "The state found, or its mirror image, was known before.",
+    Outcome.NO_MORE_FOUND: (
+        "None of the starts leads to a further state. That proves nothing of states that other starts may lead to: try more."
     ),
     Outcome.MAX_STEPS: "The step limit was reached: raise `max_steps` or resume.",
     Outcome.EIGENVALUES_UNCONVERGED: (
