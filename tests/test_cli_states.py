@@ -69,6 +69,11 @@ def test_branch_reports_special_points(shell: Shell):
     assert "start from the state trivial" in answer.err
     again = shell(*BRANCH, "--stop", "23", "--at", "21.5", "--resume", "--out", "sphere")
     assert "pitchfork-1" in again.out
+    assert fork["parities"][0] == "antisymmetric"
+    assert fork["neutral_modes"] == [{"name": "translation", "index": None}, {"name": "critical", "index": 0}]
+    assert shell("plot", "sphere:pitchfork-1", "--mode", "0") == (0, "sphere/pitchfork-1-mode-0.png\n", "")
+    assert "--mode 7: is not stored" in one_complaint(shell("plot", "sphere:pitchfork-1", "--mode", "7"))
+    assert "fork-1: is no label" in one_complaint(shell("plot", "sphere:fork-1", "--mode", "0"))
     assert shell("plot", "sphere") == (0, "sphere/figure.png\n", "")
     assert "pressures: is no observable" in one_complaint(shell("plot", "sphere", "--observable", "pressures"))
     steady = json.loads(shell("steady", *BRANCH[1:4], "--from", "sphere:user-1", "--json").out)

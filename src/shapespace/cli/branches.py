@@ -146,6 +146,8 @@ class _Display:
 
 def _record(found: "Branch") -> dict[str, Any]:
     """What --json prints."""
+    from shapespace.study.modes import neutral_modes
+
     assert found.outcome is not None
     last = found.points[-1].observables if found.points else {}
     return {
@@ -161,6 +163,9 @@ def _record(found: "Branch") -> dict[str, Any]:
                 "parameter_error": point.parameter_error if math.isfinite(point.parameter_error) else None,
                 "observables": finite(point.observables),
                 "growth_rates": point.growth_rates.tolist(),
+                "growth_rate_errors": point.growth_rate_errors.tolist(),
+                "parities": list(point.parities),
+                "neutral_modes": neutral_modes(found.scenario_at(point), point.neutral),
                 "n_unstable_before": point.n_unstable_before,
                 "n_unstable_after": point.n_unstable_after,
             }
@@ -183,11 +188,14 @@ def _record(found: "Branch") -> dict[str, Any]:
 def _summarise(found: "Branch") -> None:
     from rich.table import Table
 
-    table = Table("label", found.key, "error", "growing before", "after", "leading rate", box=None, header_style="bold")
+    table = Table(
+        "label", found.key, "error", "growing before", "after", "leading rate", "mode", box=None, header_style="bold"
+    )
     for point in found.special_points:
         counts = ["?" if n is None else str(n) for n in (point.n_unstable_before, point.n_unstable_after)]
         rate = f"{point.growth_rates[0][0]:.6g}" if len(point.growth_rates) else ""
-        table.add_row(point.label, f"{point.parameter:.10g}", f"{point.parameter_error:.1g}", *counts, rate)
+        parity = next(iter(point.parities), None) or ""
+        table.add_row(point.label, f"{point.parameter:.10g}", f"{point.parameter_error:.1g}", *counts, rate, parity)
     assert found.outcome is not None
     count = sum(point.is_step for point in found.points)
     began = f" from the state {found.began}" if found.began else ""

@@ -6,19 +6,27 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from shapespace.base.errors import InputError
-from shapespace.cli.shared import Store, app, examples
+from shapespace.cli.shared import Store, StoreOrLabel, app, examples
 
 
 @app.command(
     help_epilogue=examples(
-        "shapespace plot results/guided-division", "shapespace plot results/guided-division --out division.pdf"
+        "shapespace plot results/guided-division",
+        "shapespace plot results/guided-division --out division.pdf",
+        "shapespace plot results/sphere:pitchfork-1 --mode 0",
     )
 )
 def plot(
-    store: Store,
+    store: StoreOrLabel,
     /,
     *,
     out: Annotated[Path | None, Parameter(metavar="FILE", help="Picture file; the default is DIR/figure.png.")] = None,
+    mode: Annotated[
+        int | None,
+        Parameter(
+            metavar="N", help="Draw mode N, from 0, of DIR:LABEL of a branch, or of a state that `steady` stored."
+        ),
+    ] = None,
     observable: Annotated[
         str | None, Parameter(metavar="NAME", help="Of a branch: what to draw against the key that varies.")
     ] = None,
@@ -26,22 +34,31 @@ def plot(
     """Draw what is stored.
 
     Of a run a curve over time, snapshots of the surface, profiles of velocity and curvature; of a branch an observable
-    against the key that varies, solid where it is stable, with its special points.
+    against the key that varies, solid where it is stable, with its special points; of a mode the state displaced by it, the
+    velocity of that motion, and profiles along the curve.
     """
     from shapespace.study.files import replacing
     from shapespace.study.records import noun_of
 
-    if noun_of(store) == "branch":
+    path, name = Path(store), "figure.png"
+    if mode is not None:
+        from shapespace.study.modes import find_modes
+        from shapespace.view.mode import plot_mode
+
+        figure = plot_mode(find_modes(store), mode)
+        folder, _, label = (store, "", "") if path.is_dir() else store.rpartition(":")
+        path, name = Path(folder), "-".join(filter(None, [label, f"mode-{mode}.png"]))
+    elif noun_of(path) == "branch":
         from shapespace.study.branch_store import open_branch
         from shapespace.view.branch import plot_branch
 
-        figure = plot_branch(open_branch(store), observable)
+        figure = plot_branch(open_branch(path), observable)
     else:
         from shapespace.study.dataset import open_dataset
         from shapespace.view.figure import plot_run
 
-        figure = plot_run(open_dataset(store))
-    target = out or store / "figure.png"
+        figure = plot_run(open_dataset(path))
+    target = out or path / name
     if target.suffix[1:] not in (known := figure.canvas.get_supported_filetypes()):
         raise InputError(f"{target}: has no ending of a picture; end it in one of .{', .'.join(sorted(known))}.")
     with replacing(target) as partial:

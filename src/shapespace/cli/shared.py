@@ -48,6 +48,9 @@ app = App(
 )
 
 Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run or a branch, as `shapespace` made it.")]
+StoreOrLabel = Annotated[
+    str, Parameter(name="DIR[:LABEL]", help="Directory of a run or a branch; with --mode also a labelled point of it.")
+]
 NameOrFile = Annotated[str, Parameter(name="NAME_OR_FILE", help="A built-in scenario or a TOML file.")]
 Settings = Annotated[
     tuple[str, ...],

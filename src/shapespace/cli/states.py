@@ -51,8 +51,9 @@ def steady_command(
 ) -> int:
     """Solve for a stationary state; print its observables and the leading growth rates of small perturbations."""
     from shapespace.study.files import storage
+    from shapespace.study.modes import store_modes
     from shapespace.study.run import store_frame
-    from shapespace.study.steady import steady
+    from shapespace.study.steady import Rates, steady
     from shapespace.study.store import RunStore
 
     if start is not None and state is not None:
@@ -62,9 +63,13 @@ def steady_command(
         with storage(out):
             RunStore.check_free(out)
     found = steady(chosen, state=state or "default", start=start)
-    rates = found.rates() if found.outcome.is_success else None
-    if out is not None and found.outcome.is_success:
-        store_frame(out, chosen, found.frame, found.outcome)
+    rates = None
+    if found.outcome.is_success:
+        spectrum = found.spectrum()
+        rates = Rates.of(spectrum, found.scenario)
+        if out is not None:
+            store_frame(out, chosen, found.frame, found.outcome)
+            store_modes(out, found.modes(spectrum))
     if as_json:
         print(json.dumps(_record(found, rates, out), allow_nan=False))
     else:
@@ -78,12 +83,14 @@ def steady_command(
 
 
 def _record(found: "Steady", rates: "Rates | None", out: Path | None) -> dict[str, object]:
+    from shapespace.study.modes import neutral_modes
+
     record = described(found.outcome, found.scenario, found.observables if rates else {})
     record |= {
         "growth_rates": rates.values if rates else [],
         "growth_rate_errors": rates.errors if rates else [],
         "parities": rates.parities if rates else [],
-        "neutral": rates.neutral if rates else {},
+        "neutral_modes": neutral_modes(found.scenario, rates.neutral) if rates else [],
         "n_unstable": rates.n_unstable if rates else None,
         "residual": found.found.residual if math.isfinite(found.found.residual) else None,
         "reached": found.reached,
@@ -94,20 +101,21 @@ def _record(found: "Steady", rates: "Rates | None", out: Path | None) -> dict[st
 def _summarise(found: "Steady", rates: "Rates | None", out: Path | None) -> None:
     from rich.table import Table
 
+    from shapespace.study.modes import neutral_modes
+
     if rates is not None:
+        neutral = neutral_modes(found.scenario, rates.neutral)
+        names = {mode["index"]: f"neutral: {mode['name']}" for mode in neutral}
+        held = [f"neutral, held by the frame: {mode['name']}" for mode in neutral if mode["index"] is None]
         print_observables(found.scenario, found.observables)
         table = Table("growth rate", "frequency", "error", "mode", box=None, header_style="bold")
         for i, (real, imaginary) in enumerate(rates.values):
-            kind = " ".join(word for word in (rates.parities[i], _neutral(rates, i)) if word)
+            kind = ", ".join(word for word in (rates.parities[i], names.get(i)) if word)
             table.add_row(f"{real:.8g}", f"{imaginary:.8g}" if imaginary else "", f"{rates.errors[i]:.1g}", kind)
-        print_lines("", table, _verdict(rates))
+        print_lines("", table, *held, _verdict(rates))
     print_lines(f"{found.outcome}: {found.outcome.advice}")
     if out is not None and rates is not None:
         print_lines(f"stored in {out}")
-
-
-def _neutral(rates: "Rates", i: int) -> str:
-    return f"neutral {rates.neutral[i]}".strip() if i in rates.neutral else ""
 
 
 def _verdict(rates: "Rates") -> str:

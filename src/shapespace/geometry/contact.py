@@ -44,7 +44,7 @@ def crosses_itself(outline: Outline, u: Array) -> bool:
 
 
 def _refined(u: Array, first: Indices, second: Indices) -> tuple[Array, Indices, Indices]:
-    """Only the pieces that take part, cut into parts: their ends u, and the pairs of all parts of a pair. What lies between two such pieces pairs with none."""
+    """The pieces that take part, cut into parts: their ends u, and the pairs of all parts of a pair."""
     taking = np.unique(np.concatenate([first, second]))
     cuts = [np.linspace(u[i], u[i + 1], PARTS + 1) for i in taking]
     finer = np.unique(np.concatenate(cuts))

@@ -8,7 +8,7 @@ import numpy as np
 
 from shapespace.analysis.branch import Point, metric
 from shapespace.analysis.passage import Hopf, growing_pairs, locate_hopf
-from shapespace.analysis.stability import Disc, Spectrum, solve_spectrum
+from shapespace.analysis.stability import Disc, Spectrum
 from shapespace.analysis.tracing import Located, Missed, singular_points
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -16,6 +16,7 @@ from shapespace.geometry.contact import crosses_itself
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
 from shapespace.study.keyed import KeyedProblem
+from shapespace.study.modes import spectrum_at
 from shapespace.study.observables import CLOSING_RADIUS, neck_radius
 from shapespace.study.scenario import Scenario
 from shapespace.study.steady import Rates, frame_of, observables_at
@@ -198,7 +199,7 @@ class Surveyor:
 
     def _solve(self, point: Point, near: Spectrum | None) -> Spectrum:
         assert isinstance(point.problem, KeyedProblem)
-        return solve_spectrum(point.problem, point.x, point.p, near=near)
+        return spectrum_at(point.problem, point.x, point.p, near=near)
 
     def _spectrum_of(self, point: BranchPoint) -> Spectrum | None:
         """What a stored point keeps of its spectrum."""

@@ -12,7 +12,7 @@ from shapespace.analysis.bifurcation import Kind, solve_singular
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
 from shapespace.analysis.extended import Parameter
-from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
+from shapespace.analysis.stability import Spectrum
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.analysis.tracing import Located, side_branches, traced
 from shapespace.base.arrays import Array
@@ -24,6 +24,7 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
+from shapespace.study.modes import Modes, spectrum_at
 from shapespace.study.observables import measure
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import Start, find_start
@@ -97,11 +98,24 @@ class Steady:
 
     def spectrum(self, count: int = 6) -> Spectrum:
         """Leading growth rates and modes, dimensionless."""
-        return solve_spectrum(self.problem, self.found.x, self.found.p, Spectral(count=count))
+        return spectrum_at(self.problem, self.found.x, self.found.p, count=count)
 
     def rates(self, count: int = 6) -> Rates:
         """Leading growth rates in the scenario's units."""
         return Rates.of(self.spectrum(count), self.scenario)
+
+    def modes(self, spectrum: Spectrum) -> Modes:
+        """The modes of a spectrum of this state, to store and to draw."""
+        rates = Rates.of(spectrum, self.scenario)
+        return Modes(
+            self.scenario,
+            self.frame,
+            np.array(rates.values).reshape(-1, 2),
+            np.array(rates.errors),
+            spectrum.modes,
+            spectrum.parities,
+            rates.neutral,
+        )
 
     @property
     def reached(self) -> dict[str, float]:

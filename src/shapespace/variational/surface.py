@@ -68,6 +68,11 @@ class SurfaceSystem(AbstractSystem):
             scalars=tuple(-1.0 if name in ODD else 1.0 for name in self.scalars),
         )
 
+    @property
+    def held_symmetries(self) -> tuple[str, ...]:
+        """Motions that cost nothing and that a condition holds: translation along the axis, by z(0) + z(1) = 0 with v0 free."""
+        return ("translation",) if "v0" in self.scalars else ()
+
     def named(self, p: Traced) -> Any:
         """Parameters by name."""
         return SimpleNamespace(**{name: p[i] for i, name in enumerate(self.parameters)})

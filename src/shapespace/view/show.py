@@ -7,11 +7,14 @@ from typing import Protocol
 import xarray as xr
 from matplotlib.figure import Figure
 
+from shapespace.base.errors import InputError
 from shapespace.study.branch_store import Branch, open_branch
 from shapespace.study.dataset import open_dataset
+from shapespace.study.modes import find_modes
 from shapespace.study.records import noun_of
 from shapespace.view.branch import plot_branch
 from shapespace.view.figure import plot_run
+from shapespace.view.mode import plot_mode
 from shapespace.view.movie import save_movie
 
 
@@ -33,11 +36,19 @@ def _dataset_of(source: Source) -> xr.Dataset:
     return open_dataset(source) if isinstance(source, str | Path) else source.dataset
 
 
-def plot(source: Source | Branch, out: str | Path | None = None) -> Figure:
-    """The figure of a run or of a branch, stored or not; also written to `out` (.png, .pdf, .svg) if given."""
-    if isinstance(source, str | Path) and noun_of(source) == "branch":
-        source = open_branch(source)
-    figure = plot_branch(source) if isinstance(source, Branch) else plot_run(_dataset_of(source))
+def plot(source: Source | Branch, out: str | Path | None = None, *, mode: int | None = None) -> Figure:
+    """The figure of a run or of a branch, stored or not; also written to `out` (.png, .pdf, .svg) if given.
+
+    mode: number of a mode of a stored state to draw instead, `source` being `DIR:LABEL` of a branch or `DIR` of a state.
+    """
+    if mode is not None:
+        if not isinstance(source, str | Path):
+            raise InputError(f"mode = {mode}: is drawn from a stored state; give its directory, or DIR:LABEL.")
+        figure = plot_mode(find_modes(str(source)), mode)
+    else:
+        if isinstance(source, str | Path) and noun_of(source) == "branch":
+            source = open_branch(source)
+        figure = plot_branch(source) if isinstance(source, Branch) else plot_run(_dataset_of(source))
     if out is not None:
         figure.savefig(out)
     return figure

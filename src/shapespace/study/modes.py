@@ -1,0 +1,130 @@
+"""Modes: how small perturbations of a state at rest look and grow, which of them are neutral and why, stored and found again."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
+from shapespace.base.arrays import Array
+from shapespace.base.errors import InputError, StoreError
+from shapespace.numerics.state import State
+from shapespace.study.branch_point import ComplexArray
+from shapespace.study.engine import Engine
+from shapespace.study.files import storage, write_atomically
+from shapespace.study.frame import DAMAGE, Frame, read_arrays, write_arrays
+from shapespace.study.keyed import KeyedProblem
+from shapespace.study.scenario import Scenario
+from shapespace.study.starts import find_start
+
+MODES_FILE = "modes.npz"
+"""In the directory of a state that `steady` stored."""
+CRITICAL = "critical"
+"""Name of a neutral mode that no symmetry and no conservation law brings: the state is where stability changes."""
+AMOUNT = "regulator-amount"
+"""Without turnover the amount of the regulator is free: states with a little more of it are states as well."""
+
+
+def spectrum_at(problem: KeyedProblem, x: Array, p: Array, *, count: int = 6, near: Spectrum | None = None) -> Spectrum:
+    """Leading growth rates and modes, dimensionless, with the neutral ones of conservation laws by name."""
+    return solve_spectrum(problem, x, p, Spectral(count=count), near=near, conserved=_conserved(problem, x, p))
+
+
+def neutral_modes(scenario: Scenario, neutral: Mapping[int, str]) -> list[dict[str, object]]:
+    """Name, and place among the leading rates, of each neutral mode; no place where a condition of the problem holds it.
+
+    neutral: name by place, empty where none is known.
+    """
+    held = Engine.of(scenario).system.held_symmetries
+    found: list[dict[str, object]] = [{"name": name, "index": None} for name in held]
+    return found + [{"name": name or CRITICAL, "index": place} for place, name in sorted(neutral.items())]
+
+
+def _conserved(problem: KeyedProblem, x: Array, p: Array) -> dict[str, Array]:
+    """Gradients (n,) of quantities that no motion changes: without turnover the amount, int c r h du."""
+    base = problem.base
+    fields, parameters = base.system.fields, base.system.parameters
+    if "c" not in fields or problem.powers.value(p)[parameters.index("turnover_rate")] != 0.0:
+        return {}
+    state = base.unpack(x)
+    values, rule = state.stage_values(), state.rule
+    weights = state.widths[:, None] * rule.weights
+    h = base.system.scalars.index("h")
+    gradient = State(
+        state.mesh,
+        np.zeros_like(state.nodes),
+        np.zeros_like(state.slopes),
+        np.zeros_like(state.algebraic),
+        np.zeros_like(state.scalars),
+    )
+    for one, other in (("c", "r"), ("r", "c")):
+        share = weights * values[..., fields.index(other)] * state.scalars[h]
+        gradient.nodes[:-1, fields.index(one)] += share.sum(axis=1)
+        gradient.slopes[..., fields.index(one)] += state.widths[:, None] * (share @ rule.matrix)
+    gradient.scalars[h] = (weights * values[..., fields.index("c")] * values[..., fields.index("r")]).sum()
+    return {AMOUNT: base.pack(gradient)}
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """Leading modes (m, n) of a state of a scenario, with growth_rates (m, 2) and errors (m,) in its units.
+
+    parities: symmetric, antisymmetric or None; neutral: names by place, empty where none is known.
+    """
+
+    scenario: Scenario
+    frame: Frame
+    growth_rates: Array
+    errors: Array
+    modes: ComplexArray
+    parities: tuple[str | None, ...]
+    neutral: dict[int, str]
+
+    def mode(self, index: int) -> tuple[State, State]:
+        """Real and imaginary part of a mode, as changes of all unknowns. InputError where there is none of this number."""
+        if not 0 <= index < len(self.modes):
+            last = f"0 to {len(self.modes) - 1}" if len(self.modes) else "one with growth rates"
+            raise InputError(f"--mode {index}: is not stored; choose {last}.")
+        base = Engine.of(self.scenario).problem.on_mesh(self.frame.mesh)
+        return base.unpack(self.modes[index].real.copy()), base.unpack(self.modes[index].imag.copy())
+
+
+def store_modes(path: Path, modes: Modes) -> None:
+    """Write modes beside the state in the directory of a store."""
+    words = {"parities": modes.parities, "neutral": modes.neutral}
+    arrays: dict[str, NDArray[Any]] = {
+        "growth_rates": modes.growth_rates,
+        "growth_rate_errors": modes.errors,
+        "modes": modes.modes,
+        "about": np.frombuffer(json.dumps(words).encode(), dtype=np.uint8),
+    }
+    with storage(path):
+        write_atomically(path / MODES_FILE, write_arrays(arrays))
+
+
+def find_modes(text: str) -> Modes:
+    """The modes of a labelled point of a branch (`STORE:LABEL`), or of a state that `steady` stored (`STORE`)."""
+    start = find_start(text)
+    point = start.point
+    if point is not None:
+        if not len(point.modes):
+            raise InputError(f"{text}: has no modes; choose a labelled point of a branch followed with growth rates.")
+        rates, errors, neutral = point.growth_rates, point.growth_rate_errors, point.neutral
+        return Modes(start.scenario, start.frame, rates, errors, point.modes, point.parities, neutral)
+    file = Path(text) / MODES_FILE
+    if not file.is_file():
+        raise InputError(f"{text}: has no modes; `shapespace steady --from {text} --out DIR` finds and stores them.")
+    with storage(file):
+        data = file.read_bytes()
+    try:
+        stored = read_arrays(data)
+        about = json.loads(stored["about"].tobytes())
+        neutral = {int(place): name for place, name in about["neutral"].items()}
+        rates, errors, modes = (stored[name] for name in ("growth_rates", "growth_rate_errors", "modes"))
+        return Modes(start.scenario, start.frame, rates, errors, modes, tuple(about["parities"]), neutral)
+    except DAMAGE as error:
+        raise StoreError(f"{file}: is damaged ({error}); store the state again with `shapespace steady`.") from None
