@@ -9,8 +9,9 @@ import shapespace as ss
 from shapespace.base.errors import InputError
 from shapespace.base.problem import Rate
 from shapespace.study.keyed import KeyedProblem
-from shapespace.study.modes import AMOUNT, CRITICAL, find_modes, neutral_modes, spectrum_at, store_modes
+from shapespace.study.modes import CRITICAL, find_modes, neutral_modes, store_modes
 from shapespace.study.run import store_frame
+from shapespace.study.spectra import AMOUNT, spectrum_at
 from shapespace.study.steady import Rates, Steady
 from shapespace.view.mode import plot_mode
 

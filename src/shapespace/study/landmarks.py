@@ -16,9 +16,9 @@ from shapespace.geometry.contact import crosses_itself
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
 from shapespace.study.keyed import KeyedProblem
-from shapespace.study.modes import spectrum_at
 from shapespace.study.observables import CLOSING_RADIUS, neck_radius
 from shapespace.study.scenario import Scenario
+from shapespace.study.spectra import spectrum_at
 from shapespace.study.steady import Rates, frame_of, observables_at
 
 HOPF, CHANGE = "hopf", "stability-change"

@@ -1,4 +1,4 @@
-"""Modes: how small perturbations of a state at rest look and grow, which of them are neutral and why, stored and found again."""
+"""Modes as results: how small perturbations of a state at rest look, which of them are neutral and why; stored and found again."""
 
 import json
 from collections.abc import Mapping
@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError, StoreError
 from shapespace.numerics.state import State
@@ -17,7 +16,6 @@ from shapespace.study.branch_point import ComplexArray
 from shapespace.study.engine import Engine
 from shapespace.study.files import storage, write_atomically
 from shapespace.study.frame import DAMAGE, Frame, read_arrays, write_arrays
-from shapespace.study.keyed import KeyedProblem
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import find_start
 
@@ -25,13 +23,6 @@ MODES_FILE = "modes.npz"
 """In the directory of a state that `steady` stored."""
 CRITICAL = "critical"
 """Name of a neutral mode that no symmetry and no conservation law brings: the state is where stability changes."""
-AMOUNT = "regulator-amount"
-"""Without turnover the amount of the regulator is free: states with a little more of it are states as well."""
-
-
-def spectrum_at(problem: KeyedProblem, x: Array, p: Array, *, count: int = 6, near: Spectrum | None = None) -> Spectrum:
-    """Leading growth rates and modes, dimensionless, with the neutral ones of conservation laws by name."""
-    return solve_spectrum(problem, x, p, Spectral(count=count), near=near, conserved=_conserved(problem, x, p))
 
 
 def neutral_modes(scenario: Scenario, neutral: Mapping[int, str]) -> list[dict[str, object]]:
@@ -42,31 +33,6 @@ def neutral_modes(scenario: Scenario, neutral: Mapping[int, str]) -> list[dict[s
     held = Engine.of(scenario).system.held_symmetries
     found: list[dict[str, object]] = [{"name": name, "index": None} for name in held]
     return found + [{"name": name or CRITICAL, "index": place} for place, name in sorted(neutral.items())]
-
-
-def _conserved(problem: KeyedProblem, x: Array, p: Array) -> dict[str, Array]:
-    """Gradients (n,) of quantities that no motion changes: without turnover the amount, int c r h du."""
-    base = problem.base
-    fields, parameters = base.system.fields, base.system.parameters
-    if "c" not in fields or problem.powers.value(p)[parameters.index("turnover_rate")] != 0.0:
-        return {}
-    state = base.unpack(x)
-    values, rule = state.stage_values(), state.rule
-    weights = state.widths[:, None] * rule.weights
-    h = base.system.scalars.index("h")
-    gradient = State(
-        state.mesh,
-        np.zeros_like(state.nodes),
-        np.zeros_like(state.slopes),
-        np.zeros_like(state.algebraic),
-        np.zeros_like(state.scalars),
-    )
-    for one, other in (("c", "r"), ("r", "c")):
-        share = weights * values[..., fields.index(other)] * state.scalars[h]
-        gradient.nodes[:-1, fields.index(one)] += share.sum(axis=1)
-        gradient.slopes[..., fields.index(one)] += state.widths[:, None] * (share @ rule.matrix)
-    gradient.scalars[h] = (weights * values[..., fields.index("c")] * values[..., fields.index("r")]).sum()
-    return {AMOUNT: base.pack(gradient)}
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,9 +24,10 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
-from shapespace.study.modes import Modes, spectrum_at
+from shapespace.study.modes import Modes
 from shapespace.study.observables import measure
 from shapespace.study.scenario import Scenario
+from shapespace.study.spectra import spectrum_at
 from shapespace.study.starts import Start, find_start
 
 NEWTON = Newton(tolerance=1e-10)
