@@ -1,4 +1,4 @@
-"""Modes as results: how small perturbations of a state at rest look, which of them are neutral and why; stored and found again."""
+"""Modes as results: how small perturbations of a state at rest look, which of them are neutral and why; stored, found again."""
 
 import json
 from collections.abc import Mapping
