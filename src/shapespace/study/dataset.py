@@ -64,6 +64,12 @@ def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome |
     return dataset
 
 
+def profile_of(scenario: Scenario, frame: Frame) -> dict[str, Array]:
+    """The fields (point,) of one frame along its curve, by name, in the scenario's units."""
+    fields = _fields(Engine.of(scenario), frame)
+    return {name: values * scenario.scales.factor(name) for name, values in fields.items()}
+
+
 def open_dataset(path: str | Path) -> xr.Dataset:
     """The dataset of a stored run, finished or not. StoreError where there is none, or nothing in it yet."""
     store = RunStore.open(path)

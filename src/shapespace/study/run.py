@@ -52,13 +52,18 @@ class Run:
             return make_dataset(self.scenario, self.frames, self.outcome)
         return open_dataset(self.store)
 
+    def state(self, number: int = -1) -> Start:
+        """A frame, the last one by default, for another run or a stationary state to start from."""
+        frame = self.frames[number] if self.store is None else RunStore.open(self.store).read(number)
+        return Start(f"frame {number} of a run", self.scenario, frame)
+
 
 def run(
     scenario: Scenario,
     *,
     out: str | Path | None = None,
     resume: bool = False,
-    start: str | Path | None = None,
+    start: Start | str | Path | None = None,
     progress: Progress | None = None,
     ready: Callable[[int], None] | None = None,
 ) -> Run:
@@ -67,13 +72,14 @@ def run(
     `out` is the directory of the store, new or empty; without it the frames are kept in memory. With `resume` a store
     in `out` is continued; one that has already ended as asked is left as it is. InputError and StoreError before
     anything is computed; StoreError when the disk fills up, with all frames so far intact. `start` is a stored state to
-    begin with in place of the scenario's initial one: `STORE` or `STORE:LABEL`. `ready` is called once when the store is,
+    begin with in place of the scenario's initial one: `STORE` or `STORE:LABEL`, or one in memory (`Run.state`,
+    `Steady.perturbed`). `ready` is called once when the store is,
     with the number of its frames; `progress` after each new frame.
     """
     began = perf_counter()
     first = None
     if start is not None:
-        first = find_start(start)
+        first = start if isinstance(start, Start) else find_start(start)
         first.check_fits(scenario)
     if out is None:
         if resume:

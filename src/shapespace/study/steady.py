@@ -134,6 +134,11 @@ class Steady:
         """The state as a frame at time zero, to store or to start from."""
         return frame_of(self.problem, self.found.x, self.observables)
 
+    def perturbed(self, amplitude: float, mode: int = 0, count: int = 6) -> Start:
+        """The state x + amplitude Re(m) for a run to start from, m the mode of unit size of the leading rate number `mode`."""
+        x = self.found.x + amplitude * self.spectrum(count).modes[mode].real
+        return Start("a perturbed state", self.scenario, frame_of(self.problem, x, self.observables))
+
 
 def observables_at(scenario: Scenario, problem: KeyedProblem, x: Array) -> dict[str, float]:
     """Observables of a state of the scenario at rest, in its units."""

@@ -34,7 +34,7 @@ def plot_branch(branch: Branch, observable: str | None = None) -> Figure:
         figure = Figure(figsize=(style.WIDTH_MM * 0.75 * style.MM, HEIGHT_MM * style.MM), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        lines = {_draw_stretch(axes, stretch, name) for stretch in stretches(branch.points, name)}
+        lines = draw_lines(axes, branch.points, name)
         specials = [point for point in known if point in branch.special_points]
         _draw_specials(axes, specials, name)
         axes.margins(0.06, 0.1)
@@ -73,12 +73,21 @@ def stretches(points: Sequence[BranchPoint], name: str) -> list[list[BranchPoint
     return [stretch for stretch in found if len(stretch) > 1]
 
 
-def _draw_stretch(axes: Axes, stretch: Sequence[BranchPoint], name: str) -> str:
-    """Solid where nothing grows, dashed where something does, dotted where that is not known; returns which."""
+def draw_lines(
+    axes: Axes, points: Sequence[BranchPoint], name: str, across: str | None = None, colour: str | None = None
+) -> set[str]:
+    """Points in the order of their branch as lines: solid where nothing grows, dashed where something does, dotted where that
+    is not known; returns which. across: observable to the right in place of the parameter; colour: one for all lines.
+    """
+    return {_draw_stretch(axes, stretch, name, across, colour) for stretch in stretches(points, name)}
+
+
+def _draw_stretch(axes: Axes, stretch: Sequence[BranchPoint], name: str, across: str | None, colour: str | None) -> str:
     inner = [point for point in stretch[1:] if point.is_step] or [point for point in stretch if point.is_step]
     line = _line(inner[0]) if inner else ":"
-    x, y = zip(*((point.parameter, point.observables[name]) for point in stretch), strict=True)
-    axes.plot(x, y, line, color=style.BLUE if line == "-" else style.INK)
+    x = [point.observables[across] if across else point.parameter for point in stretch]
+    y = [point.observables[name] for point in stretch]
+    axes.plot(x, y, line, color=colour or (style.BLUE if line == "-" else style.INK))
     return line
 
 
