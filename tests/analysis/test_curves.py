@@ -7,7 +7,7 @@ from tests.classic import SecondOrder, at_rest, chan, mean_free
 from shapespace.analysis.bifurcation import Kind, SingularPoint, locate_branch_point
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
-from shapespace.analysis.curves import Cusp, parameters_at, start_curve, traced_curve
+from shapespace.analysis.curves import CurveKind, Special, own_parameter, parameters_at, start_curve, traced_curve
 from shapespace.analysis.extended import AbstractMeasure, Parameter
 from shapespace.analysis.stationary import solve_stationary
 from shapespace.analysis.tracing import Located, traced
@@ -58,17 +58,21 @@ def test_the_cusp_of_chan():
     start = start_curve(first, 1, options=options)
     assert isinstance(start, Point)
     curve = Continuation([start], [Stop(Parameter(1), 0.01, "end", True)], options)
-    cusps, last = [], start
+    cusps: list[Special] = []
+    last = start
     for one in traced_curve(curve):
-        if isinstance(one, Cusp):
+        if isinstance(one, Special):
             cusps.append(one)
-        else:
+        elif isinstance(one, Point):
             last = one
     assert curve.outcome is Outcome.REACHED_STOP
     assert abs(parameters_at(last)[0] - second.parameter) < 1e-8
     assert len(cusps) == 1
-    assert abs(cusps[0].second - 0.0282060679) < 1e-9
-    assert abs(cusps[0].first - 4.1909181064) < 1e-8
+    assert cusps[0].kind is CurveKind.CUSP
+    # The references are rounded in the last digit given.
+    assert abs(own_parameter(cusps[0].point) - 4.1909181064) < cusps[0].errors[0] + 5e-11
+    assert abs(cusps[0].point.parameter - 0.0282060679) < cusps[0].errors[1] + 5e-11
+    assert max(cusps[0].errors) < 1e-8
 
 
 def test_a_curve_of_pitchforks():

@@ -67,7 +67,7 @@ def locate_fold(
     final = SingularProblem(problem, index, kernel).with_kernel(root.x, p)
     at = final.parameters(root.x, p)
     directions = np.append(final.kernel[0], 0.0)[None]
-    error = _parameter_error(final, root.x, p)
+    error = parameter_error(final, root.x, p)
     return SingularPoint(Kind.FOLD, problem, index, final.state(root.x), at, error, final.kernel, directions)
 
 
@@ -86,7 +86,7 @@ def locate_branch_point(
     directions = branch_directions(form) @ final.kernel
     if len(directions) < 2:
         return Outcome.DIVERGED
-    at, error = final.parameters(root.x, p), _parameter_error(final, root.x, p)
+    at, error = final.parameters(root.x, p), parameter_error(final, root.x, p)
     tilts = np.abs(directions[:, -1]) / max(abs(at[index]), 1.0)
     kind = Kind.PITCHFORK if tilts.min() < TILT else Kind.TRANSCRITICAL
     return SingularPoint(kind, problem, index, final.state(root.x), at, error, final.kernel, directions)
@@ -141,20 +141,18 @@ def _unit_vectors(problem: AbstractSmoothProblem, x: Array, vectors: Array) -> A
     return np.asarray(vectors / lengths[:, None])
 
 
-def _parameter_error(final: SingularProblem, big_x: Array, p: Array) -> float:
+def parameter_error(final: SingularProblem, big_x: Array, p: Array) -> float:
     """How far the parameter moves on a mesh twice as fine, and what Newton leaves; NaN where that cannot be found."""
-    value, n = big_x[len(final.state(big_x))], len(final.state(big_x))
-    finer = final.base.refined()
+    value = big_x[len(final.state(big_x))]
     left = LOCATION.tolerance * max(abs(value), 1.0)
+    finer = final.refined()
     if finer is None:
         return float(left)
-    kernel = np.stack([np.append(final.base.carried(v[:n], finer), v[n:]) for v in final.kernel])
-    problem = replace(final, base=finer, kernel=kernel)
-    start = final.carried(big_x, problem)
-    root = solve_root(problem, start, p, _rest(problem, start, p), LOCATION)
+    start = final.carried(big_x, finer)
+    root = solve_root(finer, start, p, _rest(finer, start, p), LOCATION)
     if root.outcome is not Outcome.CONVERGED:
         return float("nan")
-    return float(SAFETY * abs(root.x[len(problem.state(root.x))] - value) + left)
+    return float(SAFETY * abs(root.x[len(finer.state(root.x))] - value) + left)
 
 
 def _rest(problem: AbstractProblem, x: Array, p: Array) -> Rate:

@@ -121,6 +121,7 @@ class Continuation:
             if accepted is None:
                 self.outcome = Outcome.BRANCH_STALLED
                 return
+            accepted = replace(accepted, problem=accepted.problem.renewed(accepted.x, accepted.p))
             past = [*past, accepted][-MEMORY:]
             yield accepted
             self.outcome = self._ending(accepted)

@@ -96,6 +96,10 @@ class AbstractContinuableProblem(AbstractProblem):
     def derivative(self, x: Array, p: Array, dx: Array, dp: Array) -> Array:
         """F_x dx + F_p dp (n,) at rest."""
 
+    def renewed(self, x: Array, p: Array) -> "AbstractContinuableProblem":
+        """The same problem on the same discretisation, made ready to go on from the solution x; mostly itself."""
+        return self
+
     @abstractmethod
     def weights(self, x: Array) -> Array:
         """w (n,), not negative: sum_i w_i a_i b_i is an inner product of increments near x that no discretisation changes."""
