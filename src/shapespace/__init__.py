@@ -17,6 +17,9 @@ if TYPE_CHECKING:
     from shapespace.study.branch_store import Branch as Branch
     from shapespace.study.branch_store import open_branch as open_branch
     from shapespace.study.branching import branch as branch
+    from shapespace.study.curve_store import Curve as Curve
+    from shapespace.study.curve_store import open_curve as open_curve
+    from shapespace.study.curves import curve as curve
     from shapespace.study.dataset import open_dataset as open_dataset
     from shapespace.study.run import Run as Run
     from shapespace.study.run import run as run
@@ -37,6 +40,9 @@ _HOMES = {
     "Outcome": "base.outcome",
     "Branch": "study.branch_store",
     "open_branch": "study.branch_store",
+    "Curve": "study.curve_store",
+    "open_curve": "study.curve_store",
+    "curve": "study.curves",
     "branch": "study.branching",
     "open_dataset": "study.dataset",
     "Run": "study.run",

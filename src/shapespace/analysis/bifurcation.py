@@ -1,6 +1,6 @@
 """Locate and classify folds and branch points, with an error of the parameter; directions of the branches that meet there."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np

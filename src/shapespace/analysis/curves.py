@@ -116,7 +116,7 @@ def closes(start: Point, before: Point, after: Point) -> bool:
     if weights @ (way - share * chord) ** 2 > weights @ chord**2:
         return False
     near = point_between(before, after, share)
-    return near is not None and weights @ (near.joined - first.joined) ** 2 < (0.01**2) * (weights @ chord**2)
+    return near is not None and bool(weights @ (near.joined - first.joined) ** 2 < 1e-4 * (weights @ chord**2))
 
 
 def branches_at(point: Point) -> tuple[Array, Array]:
@@ -147,7 +147,7 @@ def turning(point: Point) -> float:
 
 
 def regularity(point: Point) -> float:
-    """The inverse of the size of a fixed solution of the curve's system, with the determinant's sign: zero where it is singular."""
+    """Zero where the curve's system is singular: the inverse size of a fixed solution, with the determinant's sign."""
     X = point.joined
     plane = orthogonal_plane(point, metric(point.problem, X) * point.tangent, X)
     _, linearisation = plane.linearise(X, point.p, _rest(point))

@@ -63,8 +63,8 @@ class SingularProblem(AbstractContinuableProblem):
     """The defining system of a fold (kernel (1, n)) or of a branch point (kernel (2, n + 1)) in parameter `index`.
 
     X = (x, lambda) or (x, lambda, sigma); p[index] is not used. kernel: approximate kernel vectors, unit vectors in the
-    weights of the base, from which borders are made; better ones come with `renewed`. across: what makes the column b, the direction n
-    (n_p,) of a fold or the form a (2, 2) of a branch point; empty where a point is located.
+    weights of the base, from which borders are made; better ones come with `renewed`. across: what makes the column
+    b, the direction n (n_p,) of a fold or the form a (2, 2) of a branch point; empty where a point is located.
     """
 
     base: AbstractSmoothProblem

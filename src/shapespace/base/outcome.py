@@ -24,6 +24,9 @@ class Outcome(StrEnum):
     BRANCH_STALLED = "branch-stalled"
     REPEATED = "repeated"
     NO_MORE_FOUND = "no-more-found"
+    CLOSED = "closed"
+    OUT_OF_RANGE = "out-of-range"
+    UNFOLDED = "unfolded"
     EIGENVALUES_UNCONVERGED = "eigenvalues-unconverged"
 
     @property
@@ -46,6 +49,8 @@ _SUCCESS = {
     Outcome.SELF_INTERSECTING,
     Outcome.REACHED_STOP,
     Outcome.NO_MORE_FOUND,
+    Outcome.CLOSED,
+    Outcome.OUT_OF_RANGE,
 }
 
 _ADVICE = {
@@ -76,6 +81,9 @@ _ADVICE = {
     Outcome.NO_MORE_FOUND: (
         "None of the starts leads to a further state. That proves nothing of states that other starts may lead to: try more."
     ),
+    Outcome.CLOSED: "The curve came back to its start: this is all of it.",
+    Outcome.OUT_OF_RANGE: "The curve leaves the values that a key can take.",
+    Outcome.UNFOLDED: "The branches part when this key changes, and cross at single values only: choose another key.",
     Outcome.MAX_STEPS: "The step limit was reached: raise `max_steps` or resume.",
     Outcome.EIGENVALUES_UNCONVERGED: (
         "The leading growth rates did not converge or contradict each other: raise `elements`, or ask for fewer."

@@ -1,13 +1,12 @@
 """One stored state of a branch: all that is needed to look at it, to go on from it and to leave it another way."""
 
-import json
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from shapespace.study.frame import Array, Frame, arrays_of, frame_of_arrays, read_arrays, write_arrays
+from shapespace.study.frame import Array, Frame, Layout
 
 ComplexArray = NDArray[np.complex128]
 
@@ -62,33 +61,25 @@ class BranchPoint:
         return -self.arclength if self.leg else self.arclength
 
 
-_NUMBERS = ("parameter", "parameter_error", "arclength", "step", "sign", "next_shift")
-_ARRAYS = ("tangent", "directions", "growth_rates", "growth_rate_errors", "modes")
-_WORDS = (
-    "parities", "neutral", "n_unstable", "n_unstable_before", "n_unstable_after", "leg", "label", "kind", "is_step", "ends",
-    "missed", "began",
+_LAYOUT = Layout(
+    block="branch",
+    numbers=("parameter", "parameter_error", "arclength", "step", "sign", "next_shift"),
+    arrays=("tangent", "directions", "growth_rates", "growth_rate_errors", "modes"),
+    words=(
+        "parities", "neutral", "n_unstable", "n_unstable_before", "n_unstable_after", "leg", "label", "kind", "is_step", "ends",
+        "missed", "began",
+    ),
 )  # fmt: skip
 
 
 def encode_point(point: BranchPoint) -> bytes:
     """The bytes of a point's file: the arrays of a frame, and those of the branch."""
-    words = json.dumps({name: getattr(point, name) for name in _WORDS})
-    return write_arrays(
-        {
-            **arrays_of(point.frame),
-            "branch": np.array([getattr(point, name) for name in _NUMBERS], dtype=np.float64),
-            **{name: getattr(point, name) for name in _ARRAYS},
-            "about": np.frombuffer(words.encode(), dtype=np.uint8),
-        }
-    )
+    return _LAYOUT.encode(point)
 
 
 def decode_point(data: bytes) -> BranchPoint:
     """The point in the bytes of a file; one of DAMAGE where the bytes are not what was written."""
-    stored = read_arrays(data)
-    about = json.loads(stored["about"].tobytes())
-    values: dict[str, Any] = dict(zip(_NUMBERS, stored["branch"].tolist(), strict=True))
-    values |= {name: stored[name] for name in _ARRAYS} | {name: about[name] for name in _WORDS}
+    values = _LAYOUT.decode(data)
     values |= {name: tuple(values[name]) for name in ("parities", "missed")}
     values["neutral"] = {int(place): name for place, name in values["neutral"].items()}
-    return BranchPoint(frame=frame_of_arrays(stored), **values)
+    return BranchPoint(**values)

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Self
+from typing import Any, Protocol, Self, TypeVar
 
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
@@ -15,14 +15,67 @@ START = "start"
 """Label of the first point."""
 
 
-class BranchStore(AbstractRecordStore[BranchPoint]):
+class HasPlace(Protocol):
+    """A point of a branch or a curve."""
+
+    @property
+    def leg(self) -> int:
+        """0 on the way to the stop, 1 on the way back."""
+
+    @property
+    def arclength(self) -> float:
+        """From the start."""
+
+
+P = TypeVar("P", bound=HasPlace)
+
+
+class AbstractPathStore(AbstractRecordStore[P]):
+    """The points of one path through states. The manifest's entry named as the store says what was asked for."""
+
+    folder = "points"
+
+    @classmethod
+    def create(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
+        """A new store in a directory that is empty or does not exist; StoreError, and nothing written, otherwise."""
+        return cls._create(path, scenario, {cls.noun: dict(request)})
+
+    @classmethod
+    def resume(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
+        """A stored path to continue. Checks every point; scenario and request must be the same."""
+        path = Path(path)
+        manifest = cls._read_manifest(path)
+        stored, wanted = manifest.get(cls.noun), dict(request)
+        difference = cls._scenario_of(path, manifest).difference(scenario)
+        if not isinstance(stored, dict):
+            raise StoreError(f"{path / 'store.json'}: is damaged (no {cls.noun}); restore it, or choose another --out.")
+        for name, value in wanted.items():
+            if stored.get(name) != value:
+                difference = difference or f"{name} is {stored.get(name)!r}, not {value!r}"
+        if difference:
+            raise StoreError(
+                f"{path}: holds a {cls.noun} whose {difference}; resume with the same value or choose another --out."
+            )
+        return cls._reopen(path, scenario)
+
+    @property
+    def request(self) -> dict[str, Any]:
+        """What was asked for."""
+        return dict(self.manifest[self.noun])
+
+    def _disorder(self, previous: P, record: P) -> str | None:
+        if (record.leg, record.arclength) >= (previous.leg, previous.arclength):
+            return None
+        return f"arclength {record.arclength:g} after {previous.arclength:g}"
+
+
+class BranchStore(AbstractPathStore[BranchPoint]):
     """The points of one branch. `create` and `resume` give a store to write, `open` one to read.
 
     The manifest's entry `branch` says which branch: key, start, stop, at, and how it was begun.
     """
 
     noun = "branch"
-    folder = "points"
     note = (
         "arrays of states and modes are dimensionless, in units of the scales; parameters, observables and growth rates are in "
         "the scenario's units"
@@ -30,39 +83,6 @@ class BranchStore(AbstractRecordStore[BranchPoint]):
 
     encode = staticmethod(encode_point)
     decode = staticmethod(decode_point)
-
-    @classmethod
-    def create(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
-        """A new store in a directory that is empty or does not exist; StoreError, and nothing written, otherwise."""
-        return cls._create(path, scenario, {"branch": dict(request)})
-
-    @classmethod
-    def resume(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
-        """A stored branch to continue. Checks every point; scenario and request must be the same."""
-        path = Path(path)
-        manifest = cls._read_manifest(path)
-        stored, wanted = manifest.get("branch"), dict(request)
-        difference = cls._scenario_of(path, manifest).difference(scenario)
-        if not isinstance(stored, dict):
-            raise StoreError(f"{path / 'store.json'}: is damaged (no branch); restore it, or choose another --out.")
-        for name, value in wanted.items():
-            if stored.get(name) != value:
-                difference = difference or f"{name} is {stored.get(name)!r}, not {value!r}"
-        if difference:
-            raise StoreError(
-                f"{path}: holds a branch whose {difference}; resume with the same value or choose another --out."
-            )
-        return cls._reopen(path, scenario)
-
-    @property
-    def request(self) -> dict[str, Any]:
-        """What was asked for: key, start, stop, at, and how the branch was begun."""
-        return dict(self.manifest["branch"])
-
-    def _disorder(self, previous: BranchPoint, record: BranchPoint) -> str | None:
-        if (record.leg, record.arclength) >= (previous.leg, previous.arclength):
-            return None
-        return f"arclength {record.arclength:g} after {previous.arclength:g}"
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,13 @@
 """One accepted time step: all that is needed to look at it and to go on from it."""
 
 import io
+import json
 import struct
 import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,35 @@ def read_arrays(data: bytes) -> dict[str, NDArray[Any]]:
         # Reading a member whole checks its CRC before anything in it is believed.
         members = {name: io.BytesIO(archive.read(name)) for name in archive.namelist()}
     return {name.removesuffix(".npy"): np.lib.format.read_array(member) for name, member in members.items()}
+
+
+class Layout(NamedTuple):
+    """How a record that holds a frame and more is stored: the name of its block of numbers, and the names of its parts."""
+
+    block: str
+    numbers: tuple[str, ...]
+    arrays: tuple[str, ...]
+    words: tuple[str, ...]
+
+    def encode(self, record: Any) -> bytes:
+        """The bytes of a record's file: the arrays of its frame, and its own."""
+        words = json.dumps({name: getattr(record, name) for name in self.words})
+        return write_arrays(
+            {
+                **arrays_of(record.frame),
+                self.block: np.array([getattr(record, name) for name in self.numbers], dtype=np.float64),
+                **{name: getattr(record, name) for name in self.arrays},
+                "about": np.frombuffer(words.encode(), dtype=np.uint8),
+            }
+        )
+
+    def decode(self, data: bytes) -> dict[str, Any]:
+        """The parts of a record by name; one of DAMAGE where the bytes are not what was written."""
+        stored = read_arrays(data)
+        about = json.loads(stored["about"].tobytes())
+        values: dict[str, Any] = dict(zip(self.numbers, stored[self.block].tolist(), strict=True))
+        values |= {name: stored[name] for name in self.arrays} | {name: about[name] for name in self.words}
+        return values | {"frame": frame_of_arrays(stored)}
 
 
 def arrays_of(frame: Frame) -> dict[str, NDArray[Any]]:

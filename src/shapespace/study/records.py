@@ -339,7 +339,7 @@ class AbstractRecordStore(ABC, Generic[R]):
 
 
 def noun_of(path: str | Path) -> str | None:
-    """What a directory holds by its manifest, `run` or `branch`; None where that cannot be told."""
+    """What a directory holds by its manifest, `run`, `branch` or `curve`; None where that cannot be told."""
     try:
         manifest = json.loads((Path(path) / _MANIFEST).read_bytes())
     except (OSError, ValueError, RecursionError):
