@@ -2,15 +2,12 @@
 
 import json
 import math
-import shlex
-import sys
 from pathlib import Path
 from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from shapespace.base.errors import InputError
 from shapespace.cli.shared import (
     GAVE_UP,
     INTERRUPTED,
@@ -18,6 +15,7 @@ from shapespace.cli.shared import (
     NameOrFile,
     Settings,
     StartFrom,
+    again,
     app,
     described,
     examples,
@@ -25,6 +23,7 @@ from shapespace.cli.shared import (
     finite,
     print_lines,
     read_settings,
+    read_values,
     tell,
 )
 
@@ -69,7 +68,7 @@ def branch_command(
     from shapespace.study.branching import branch
     from shapespace.study.run import free_path
 
-    values = _read_values(at)
+    values = read_values(at)
     chosen = find_scenario(scenario).with_overrides(read_settings(settings))
     name = f"{chosen.name}-{vary}"
     path = out or (Path("results") / name if resume else free_path(name))
@@ -92,19 +91,13 @@ def branch_command(
             ready=lambda count: tell(f"continuing {path} after {count} points" if count else f"starting {path}"),
         )
     except KeyboardInterrupt:
-        tell(f"interrupted; to continue: {shlex.join(_again(path))}")
+        tell(f"interrupted; to continue: {again(path)}")
         return INTERRUPTED
     if as_json:
         print(json.dumps(_record(found), allow_nan=False))
     else:
         _summarise(found)
     return _report(found)
-
-
-def _again(path: Path) -> list[str]:
-    """The command that goes on with an interrupted branch: the same one, with where and how."""
-    words = [word for word in sys.argv[1:] if word != "--resume"]
-    return ["shapespace", *words, *([] if "--out" in words else ["--out", str(path)]), "--resume"]
 
 
 def _report(found: "Branch") -> int:
@@ -119,13 +112,6 @@ def _report(found: "Branch") -> int:
     words = [f"the branch ended early ({found.outcome}): {found.outcome.advice}", found.detail]
     tell(" ".join([*filter(None, words), f"What there is is in {found.store}."]))
     return GAVE_UP
-
-
-def _read_values(text: str | None) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")] if text else []
-    except ValueError:
-        raise InputError(f"--at {text}: must be numbers with commas between them, e.g. --at 1.5,2.") from None
 
 
 class _Display:

@@ -34,13 +34,16 @@ def plot(
     """Draw what is stored.
 
     Of a run a curve over time, snapshots of the surface, profiles of velocity and curvature; of a branch an observable
-    against the key that varies, solid where it is stable, with its special points; of a mode the state displaced by it, the
-    velocity of that motion, and profiles along the curve.
+    against the key that varies, solid where it is stable, with its special points; of a curve the plane of its two keys; of
+    a mode the state displaced by it, the velocity of that motion, and profiles along the curve.
     """
     from shapespace.study.files import replacing
     from shapespace.study.records import noun_of
 
     path, name = Path(store), "figure.png"
+    noun = noun_of(path)
+    if observable is not None and (noun != "branch" or mode is not None):
+        raise InputError(f"--observable {observable}: is for the figure of a branch; leave it away.")
     if mode is not None:
         from shapespace.study.modes import find_modes
         from shapespace.view.mode import plot_mode
@@ -48,7 +51,12 @@ def plot(
         figure = plot_mode(find_modes(store), mode)
         folder, _, label = (store, "", "") if path.is_dir() else store.rpartition(":")
         path, name = Path(folder), "-".join(filter(None, [label, f"mode-{mode}.png"]))
-    elif noun_of(path) == "branch":
+    elif noun == "curve":
+        from shapespace.study.curve_store import open_curve
+        from shapespace.view.curve import plot_curve
+
+        figure = plot_curve(open_curve(path))
+    elif noun == "branch":
         from shapespace.study.branch_store import open_branch
         from shapespace.view.branch import plot_branch
 

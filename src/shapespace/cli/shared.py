@@ -2,6 +2,7 @@
 
 import math
 import os
+import shlex
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -47,9 +48,9 @@ app = App(
     default_parameter=Parameter(negative=(), show_default=False),
 )
 
-Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run or a branch, as `shapespace` made it.")]
+Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run, as `shapespace` made it.")]
 StoreOrLabel = Annotated[
-    str, Parameter(name="DIR[:LABEL]", help="Directory of a run or a branch; with --mode also a labelled point of it.")
+    str, Parameter(name="DIR[:LABEL]", help="Directory of a run, a branch or a curve; with --mode also a labelled point.")
 ]
 NameOrFile = Annotated[str, Parameter(name="NAME_OR_FILE", help="A built-in scenario or a TOML file.")]
 Settings = Annotated[
@@ -62,7 +63,7 @@ StartFrom = Annotated[
     Parameter(
         name="--from",
         metavar="STORE[:LABEL]",
-        help="Start from the last state of a stored run, or a labelled one of a branch.",
+        help="Start from the last state of a stored run, or a labelled one of a branch or curve.",
     ),
 ]
 
@@ -83,6 +84,20 @@ def read_settings(settings: Sequence[str]) -> dict[str, str]:
             raise InputError(f"{key} = {value}: is given twice, also as {changes[key]}; give it once.")
         changes[key] = value
     return changes
+
+
+def read_values(text: str | None) -> list[float]:
+    """The numbers of --at."""
+    try:
+        return [float(part) for part in text.split(",")] if text else []
+    except ValueError:
+        raise InputError(f"--at {text}: must be numbers with commas between them, e.g. --at 1.5,2.") from None
+
+
+def again(path: Path) -> str:
+    """The command that goes on with what was interrupted: the same one, with where and how."""
+    words = [word for word in sys.argv[1:] if word != "--resume"]
+    return shlex.join(["shapespace", *words, *([] if "--out" in words else ["--out", str(path)]), "--resume"])
 
 
 def find_scenario(name_or_file: str) -> "Scenario":

@@ -55,9 +55,9 @@ Progress = Callable[[CurvePoint, int], None]
 
 @dataclass(frozen=True)
 class Request:
-    """Which curve to follow, from the stored point `origin`: in keys (the branch's and the new one), from start to stop in the new.
+    """Which curve to follow, from the stored point `origin`, in two keys: that of the branch, and another from start to stop.
 
-    value: of the new key at the origin. at: its values for exact points.
+    value: of the other key at the origin. at: its values for exact points.
     """
 
     origin: str

@@ -50,7 +50,7 @@ class Start:
 
 
 def find_start(text: str | Path) -> Start:
-    """The state that `STORE` or `STORE:LABEL` names; without a label the last one of a branch or curve. InputError where none is."""
+    """The state that `STORE` or `STORE:LABEL` names; without a label the last one. InputError where there is none."""
     path, label = Path(text), ""
     if ":" in str(text) and not path.is_dir():
         store, _, label = str(text).rpartition(":")

@@ -13,6 +13,7 @@ from shapespace.base.errors import InputError
 from shapespace.base.scales import QUANTITIES
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import Branch
+from shapespace.study.scenario import Scenario
 from shapespace.view import style
 
 TELLING = {"open-membrane": ("height",), "closed-surface": ("velocity", "equator_radius")}
@@ -38,8 +39,8 @@ def plot_branch(branch: Branch, observable: str | None = None) -> Figure:
         specials = [point for point in known if point in branch.special_points]
         _draw_specials(axes, specials, name)
         axes.margins(0.06, 0.1)
-        axes.set_xlabel(_label(branch, branch.key))
-        axes.set_ylabel(_label(branch, name))
+        axes.set_xlabel(quantity_label(branch.scenario, branch.key))
+        axes.set_ylabel(quantity_label(branch.scenario, name))
         axes.legend(handles=_legend(lines), loc="best")
     return figure
 
@@ -105,9 +106,10 @@ def _draw_specials(axes: Axes, points: Sequence[BranchPoint], name: str) -> None
             axes.annotate(point.label, (x, y), offset, textcoords="offset points", fontsize=6.5)
 
 
-def _label(branch: Branch, name: str) -> str:
+def quantity_label(scenario: Scenario, name: str) -> str:
+    """Name, symbol and unit of a key or an observable, for an axis."""
     quantity = QUANTITIES[name]
-    attributes = {"symbol": quantity.symbol, "units": branch.scenario.scales.unit(name)}
+    attributes = {"symbol": quantity.symbol, "units": scenario.scales.unit(name)}
     return style.axis_label(xr.DataArray(0.0, name=name, attrs=attributes), words=name.replace("_", " "))
 
 

@@ -1,4 +1,4 @@
-"""Pictures of runs and branches, stored or in memory: what `ss.plot` and `ss.movie` do."""
+"""Pictures of runs, branches and curves, stored or in memory: what `ss.plot` and `ss.movie` do."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -9,10 +9,12 @@ from matplotlib.figure import Figure
 
 from shapespace.base.errors import InputError
 from shapespace.study.branch_store import Branch, open_branch
+from shapespace.study.curve_store import Curve, open_curve
 from shapespace.study.dataset import open_dataset
 from shapespace.study.modes import find_modes
 from shapespace.study.records import noun_of
 from shapespace.view.branch import plot_branch
+from shapespace.view.curve import plot_curve
 from shapespace.view.figure import plot_run
 from shapespace.view.mode import plot_mode
 from shapespace.view.movie import save_movie
@@ -36,19 +38,26 @@ def _dataset_of(source: Source) -> xr.Dataset:
     return open_dataset(source) if isinstance(source, str | Path) else source.dataset
 
 
-def plot(source: Source | Branch, out: str | Path | None = None, *, mode: int | None = None) -> Figure:
-    """The figure of a run or of a branch, stored or not; also written to `out` (.png, .pdf, .svg) if given.
+def _figure(source: Source | Branch | Curve) -> Figure:
+    if isinstance(source, str | Path):
+        noun = noun_of(source)
+        source = open_branch(source) if noun == "branch" else open_curve(source) if noun == "curve" else source
+    if isinstance(source, Branch):
+        return plot_branch(source)
+    return plot_curve(source) if isinstance(source, Curve) else plot_run(_dataset_of(source))
+
+
+def plot(source: Source | Branch | Curve, out: str | Path | None = None, *, mode: int | None = None) -> Figure:
+    """The figure of a run, a branch or a curve, stored or not; also written to `out` (.png, .pdf, .svg) if given.
 
     mode: number of a mode of a stored state to draw instead, `source` being `DIR:LABEL` of a branch or `DIR` of a state.
     """
-    if mode is not None:
-        if not isinstance(source, str | Path):
-            raise InputError(f"mode = {mode}: is drawn from a stored state; give its directory, or DIR:LABEL.")
+    if mode is None:
+        figure = _figure(source)
+    elif isinstance(source, str | Path):
         figure = plot_mode(find_modes(str(source)), mode)
     else:
-        if isinstance(source, str | Path) and noun_of(source) == "branch":
-            source = open_branch(source)
-        figure = plot_branch(source) if isinstance(source, Branch) else plot_run(_dataset_of(source))
+        raise InputError(f"mode = {mode}: is drawn from a stored state; give its directory, or DIR:LABEL.")
     if out is not None:
         figure.savefig(out)
     return figure

@@ -1,0 +1,75 @@
+"""The figure of a curve: the plane of its two keys, with cusps and other special points marked and named."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.polynomial.polynomial import polyval
+
+from shapespace.analysis.branch import hermite
+from shapespace.study.curve_store import Curve, CurvePoint
+from shapespace.study.frame import Array
+from shapespace.view import style
+from shapespace.view.branch import quantity_label
+
+COLOURS = {"fold": style.BLUE, "pitchfork": style.PURPLE}
+MARKS = {
+    "cusp": "^",
+    "fold-pitchfork": "D",
+    "degenerate-pitchfork": "D",
+    "bogdanov-takens": "o",
+    "branch-point": "D",
+    "turn": "s",
+    "user": "|",
+    "end": "",
+}
+"""By kind; physical ends and stalls are crosses."""
+HEIGHT_MM = 110.0
+PIECES = 16
+"""Straight pieces between neighbours."""
+
+
+def plot_curve(curve: Curve) -> Figure:
+    """The curve, the first key to the right and the second upwards."""
+    with style.house_style():
+        figure = Figure(figsize=(style.WIDTH_MM * 0.75 * style.MM, HEIGHT_MM * style.MM), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        x, y = outline(curve.points)
+        axes.plot(x, y, color=COLOURS.get(curve.of, style.GREEN), label=f"{curve.of}s")
+        _mark(axes, curve.special_points)
+        axes.margins(0.06, 0.08)
+        axes.set_xlabel(quantity_label(curve.scenario, curve.keys[0]))
+        axes.set_ylabel(quantity_label(curve.scenario, curve.keys[1]))
+        axes.legend(loc="best")
+    return figure
+
+
+def outline(points: Sequence[CurvePoint]) -> Array:
+    """The keys (2, m) along a curve, by cubics through neighbours with their tangents, so that a cusp looks like one."""
+    pieces = [points[0].parameters[:, None]]
+    for one, other in pairwise(points):
+        length = other.place - one.place
+        if length <= 0.0:
+            continue
+        cubic = hermite(one.parameters, _slope(one), other.parameters, _slope(other), length)
+        pieces.append(np.asarray(polyval(np.linspace(0.0, length, PIECES + 1)[1:], cubic)))
+    return np.concatenate(pieces, axis=1)
+
+
+def _slope(point: CurvePoint) -> Array:
+    """Change of both keys (2,) per length in the order of the curve."""
+    unknowns = point.kernel.shape[1] - (len(point.kernel) - 1)
+    return np.array([point.tangent[unknowns], point.tangent[-1]]) * (-1.0 if point.leg else 1.0)
+
+
+def _mark(axes: Axes, points: Sequence[CurvePoint]) -> None:
+    for point in points:
+        x, y = point.parameters
+        axes.plot(x, y, MARKS.get(point.kind, "X"), color=style.RED, markersize=4.0, zorder=3)
+        if point.kind != "end":
+            offset = (6, -9 if _slope(point).prod() > 0.0 else 4)  # beside the line, right of it
+            axes.annotate(point.label, (x, y), offset, textcoords="offset points", fontsize=6.5)
