@@ -1,4 +1,4 @@
-"""The commands `steady` and `branch`, with the real solver on the swimming sphere."""
+"""The commands `steady`, `branch` and `curve`, with the real solver on the swimming sphere."""
 
 import json
 from pathlib import Path
@@ -6,6 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.shell import Shell, one_complaint
+
+from shapespace.cli import main
 
 
 @pytest.fixture
@@ -104,4 +106,68 @@ def test_bad_branch_is_one_line(shell: Shell, arguments: list[str], part: str):
     Path("foreign").mkdir()
     Path("foreign/thesis.tex").write_text("precious")
     assert part in one_complaint(shell(*BRANCH, *arguments))
+    assert [str(file) for file in Path().rglob("*") if file.is_file()] == ["foreign/thesis.tex"]
+
+
+@pytest.fixture(scope="module")
+def sphere(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """A stored branch with a pitchfork."""
+    path = tmp_path_factory.mktemp("branch") / "sphere"
+    assert main([*BRANCH, "--stop", "23", "--no-stability", "--out", str(path)]) == 0
+    return str(path)
+
+
+def test_curve_reports_points_of_two_keys(shell: Shell, sphere: str):
+    """Pe* = 2 (2 + k) (exact result 2), as a table, as JSON, and as a picture."""
+    command = (
+        "curve",
+        f"{sphere}:pitchfork-1",
+        "--vary",
+        "turnover_rate",
+        "--start",
+        "8",
+        "--stop",
+        "10",
+        "--at",
+        "9.5",
+    )
+    answer = shell(*command, "--json", "--out", "forks")
+    assert answer.status == 0, answer.err
+    record = json.loads(answer.out, parse_constant=pytest.fail)
+    assert (record["outcome"], record["scenario"], record["store"]) == ("reached-stop", "polar-swimmer", "forks")
+    assert (record["keys"], record["kind"], record["missed"]) == (["peclet", "turnover_rate"], "pitchfork", [])
+    assert record["parameters"]["turnover_rate"] == 9.0
+    assert [(one["label"], one["kind"]) for one in record["special_points"]] == [
+        ("end-2", "end"), ("user-1", "user"), ("end-1", "end"),
+    ]  # fmt: skip
+    for one in record["special_points"]:
+        wanted = 2.0 * (2.0 + one["parameters"]["turnover_rate"])
+        assert abs(one["parameters"]["peclet"] - wanted) <= one["parameter_error"]["peclet"] < 1e-7
+        assert one["parameter_error"]["turnover_rate"] == 0.0
+    assert {"start", "user-1", "end-1", "end-2"} <= {one["label"] for one in record["points"]}
+    assert record["points"][0]["observables"]["area"] == pytest.approx(4.0 * np.pi)
+    assert "turnover_rate = 9.5 user-1" in answer.err
+    assert "user-1" in shell(*command, "--resume", "--out", "forks").out
+    assert shell("plot", "forks") == (0, "forks/figure.png\n", "")
+    assert "is for the figure of a branch" in one_complaint(shell("plot", "forks", "--observable", "area"))
+    steady = json.loads(shell("steady", *BRANCH[1:4], "--from", "forks:user-1", "--json").out)
+    assert steady["parameters"]["turnover_rate"] == 9.5
+    assert steady["parameters"]["peclet"] == pytest.approx(23.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        (["--vary", "turnover_rate", "--start", "10", "--stop", "12"], "must include turnover_rate = 9.0"),
+        (["--vary", "turnover_rate", "--stop", "12", "--at", "x"], "must be numbers with commas"),
+        (["--vary", "turnover_rate", "--stop", "12", "--out", "foreign"], "holds other files"),
+        (["--vary", "peclet", "--stop", "12"], "varies along the branch already"),
+        (["--vary", "turnover_rate"], "--stop"),
+        (["--stop", "12"], "--vary"),
+    ],
+)
+def test_bad_curve_is_one_line(shell: Shell, sphere: str, arguments: list[str], part: str):
+    Path("foreign").mkdir()
+    Path("foreign/thesis.tex").write_text("precious")
+    assert part in one_complaint(shell("curve", f"{sphere}:pitchfork-1", *arguments))
     assert [str(file) for file in Path().rglob("*") if file.is_file()] == ["foreign/thesis.tex"]

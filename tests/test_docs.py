@@ -105,6 +105,7 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
         "run_command",
         "steady_command",
         "branch_command",
+        "curve_command",
         "plot",
         "movie",
         "export",
