@@ -50,7 +50,8 @@ app = App(
 
 Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run, as `shapespace` made it.")]
 StoreOrLabel = Annotated[
-    str, Parameter(name="DIR[:LABEL]", help="Directory of a run, a branch or a curve; with --mode also a labelled point.")
+    str,
+    Parameter(name="DIR[:LABEL]", help="Directory of a run, a branch or a curve; with --mode also a labelled point."),
 ]
 NameOrFile = Annotated[str, Parameter(name="NAME_OR_FILE", help="A built-in scenario or a TOML file.")]
 Settings = Annotated[
