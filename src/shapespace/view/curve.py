@@ -1,17 +1,12 @@
 """The figure of a curve: the plane of its two keys, with cusps and other special points marked and named."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.polynomial.polynomial import polyval
 
-from shapespace.analysis.branch import hermite
 from shapespace.study.curve_store import Curve, CurvePoint
-from shapespace.study.frame import Array
 from shapespace.view import style
 from shapespace.view.branch import quantity_label
 
@@ -38,7 +33,7 @@ def plot_curve(curve: Curve) -> Figure:
         figure = Figure(figsize=(style.WIDTH_MM * 0.75 * style.MM, HEIGHT_MM * style.MM), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        x, y = outline(curve.points)
+        x, y = curve.outline(PIECES)
         axes.plot(x, y, color=COLOURS.get(curve.of, style.GREEN), label=f"{curve.of}s")
         _mark(axes, curve.special_points)
         axes.margins(0.06, 0.08)
@@ -48,28 +43,10 @@ def plot_curve(curve: Curve) -> Figure:
     return figure
 
 
-def outline(points: Sequence[CurvePoint]) -> Array:
-    """The keys (2, m) along a curve, by cubics through neighbours with their tangents, so that a cusp looks like one."""
-    pieces = [points[0].parameters[:, None]]
-    for one, other in pairwise(points):
-        length = other.place - one.place
-        if length <= 0.0:
-            continue
-        cubic = hermite(one.parameters, _slope(one), other.parameters, _slope(other), length)
-        pieces.append(np.asarray(polyval(np.linspace(0.0, length, PIECES + 1)[1:], cubic)))
-    return np.concatenate(pieces, axis=1)
-
-
-def _slope(point: CurvePoint) -> Array:
-    """Change of both keys (2,) per length in the order of the curve."""
-    unknowns = point.kernel.shape[1] - (len(point.kernel) - 1)
-    return np.array([point.tangent[unknowns], point.tangent[-1]]) * (-1.0 if point.leg else 1.0)
-
-
 def _mark(axes: Axes, points: Sequence[CurvePoint]) -> None:
     for point in points:
         x, y = point.parameters
         axes.plot(x, y, MARKS.get(point.kind, "X"), color=style.RED, markersize=4.0, zorder=3)
         if point.kind != "end":
-            offset = (6, -9 if _slope(point).prod() > 0.0 else 4)  # beside the line, right of it
+            offset = (6, -9 if point.slope.prod() > 0.0 else 4)  # beside the line, right of it
             axes.annotate(point.label, (x, y), offset, textcoords="offset points", fontsize=6.5)
