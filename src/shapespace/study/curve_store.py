@@ -2,14 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.polynomial.polynomial import polyval
 
-from shapespace.analysis.branch import hermite
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint
@@ -142,16 +139,6 @@ class Curve:
                 return point
         labels = ", ".join(point.label for point in self.points if point.label)
         raise InputError(f"{label}: is no label of this curve; choose one of {labels}.")
-
-    def outline(self, pieces: int) -> Array:
-        """The keys (2, m) along the curve, by cubics in so many pieces through neighbours with their tangents, as cusps need."""
-        found = [self.points[0].parameters[:, None]]
-        for one, other in pairwise(self.points):
-            length = other.place - one.place
-            if length > 0.0:
-                cubic = hermite(one.parameters, one.slope, other.parameters, other.slope, length)
-                found.append(np.asarray(polyval(np.linspace(0.0, length, pieces + 1)[1:], cubic)))
-        return np.concatenate(found, axis=1)
 
     def scenario_at(self, point: CurvePoint) -> Scenario:
         """The scenario whose stationary state a point is."""

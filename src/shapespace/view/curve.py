@@ -1,12 +1,16 @@
 """The figure of a curve: the plane of its two keys, with cusps and other special points marked and named."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from scipy.interpolate import CubicHermiteSpline
 
 from shapespace.study.curve_store import Curve, CurvePoint
+from shapespace.study.frame import Array
 from shapespace.view import style
 from shapespace.view.branch import quantity_label
 
@@ -33,7 +37,7 @@ def plot_curve(curve: Curve) -> Figure:
         figure = Figure(figsize=(style.WIDTH_MM * 0.75 * style.MM, HEIGHT_MM * style.MM), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        x, y = curve.outline(PIECES)
+        x, y = outline(curve.points)
         axes.plot(x, y, color=COLOURS.get(curve.of, style.GREEN), label=f"{curve.of}s")
         _mark(axes, curve.special_points)
         axes.margins(0.06, 0.08)
@@ -41,6 +45,17 @@ def plot_curve(curve: Curve) -> Figure:
         axes.set_ylabel(quantity_label(curve.scenario, curve.keys[1]))
         axes.legend(loc="best")
     return figure
+
+
+def outline(points: Sequence[CurvePoint]) -> Array:
+    """The keys (2, m) along a curve, by cubics through neighbours with their tangents, so that a cusp looks like one."""
+    kept = [one for one, other in pairwise(points) if other.place > one.place] + [points[-1]]
+    if len(kept) == 1:
+        return kept[0].parameters[:, None]
+    places = np.array([point.place for point in kept])
+    spline = CubicHermiteSpline(places, [point.parameters for point in kept], [point.slope for point in kept])
+    fine = np.interp(np.arange(PIECES * (len(kept) - 1) + 1) / PIECES, np.arange(len(kept)), places)
+    return np.asarray(spline(fine).T)
 
 
 def _mark(axes: Axes, points: Sequence[CurvePoint]) -> None:
