@@ -106,6 +106,7 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
         "steady_command",
         "branch_command",
         "curve_command",
+        "search_command",
         "plot",
         "movie",
         "export",

@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from shapespace.study.scenario import load_scenario as load_scenario
     from shapespace.study.scenario import scenario as scenario
     from shapespace.study.scenario import scenario_names as scenario_names
+    from shapespace.study.search_store import Search as Search
+    from shapespace.study.search_store import open_search as open_search
+    from shapespace.study.searching import search_states as search_states
     from shapespace.study.steady import Steady as Steady
     from shapespace.study.steady import steady as steady
     from shapespace.view.show import movie as movie
@@ -51,6 +54,9 @@ _HOMES = {
     "load_scenario": "study.scenario",
     "scenario": "study.scenario",
     "scenario_names": "study.scenario",
+    "Search": "study.search_store",
+    "open_search": "study.search_store",
+    "search_states": "study.searching",
     "Steady": "study.steady",
     "steady": "study.steady",
     "movie": "view.show",

@@ -40,6 +40,8 @@ NEAR = 0.1
 """Solutions that are farther apart than this, in the problem's weights, differ; of nearer ones Newton's method decides."""
 AMPLITUDES = (0.1, 0.3, 1.0)
 """Perturbations of a known solution, in the problem's weights."""
+LEADING = 4
+"""Modes that perturb a known solution."""
 SYMMETRIC = 1e-3
 """A state that is no farther than this from its mirror image is its own."""
 SAME = 1e-5
@@ -198,9 +200,13 @@ def solve_deflated(
 ) -> Trial:
     """Search from a guess for a solution at parameters p that is none of the known ones, nor a mirror image of one.
 
-    It is found on the guess's discretisation and then converged without deflation, on one that suits it.
+    It is found on the guess's discretisation and then converged without deflation, on one that suits it. From a guess that
+    is a known solution nothing leads away.
     """
     problem, x = guess.problem, guess.x
+    for number, one in enumerate(known):
+        if min(distance(problem, x, image) for image in images(one, problem)) <= SAME:
+            return Trial(guess.name, replace(one, outcome=Outcome.REPEATED, iterations=0), number)
     deflated = DeflatedProblem.of(problem, known, options)
     root = solve_root(deflated, x, p, Rate.of_growth(problem.stored(x, p)), search)
     if root.outcome is not Outcome.CONVERGED:
@@ -248,7 +254,7 @@ def search(
 def perturbed(one: Stationary, spectrum: Spectrum, name: str, amplitudes: Sequence[float] = AMPLITUDES) -> list[Guess]:
     """A solution moved along its leading modes; of a mode that breaks the symmetry one side, as the other is its mirror image."""
     assert isinstance(one.problem, AbstractSmoothProblem)
-    modes = list(zip(spectrum.modes.real, spectrum.parities, spectrum.rates.imag, strict=True))
+    modes = list(zip(spectrum.modes.real, spectrum.parities, spectrum.rates.imag, strict=True))[:LEADING]
     return [
         Guess(f"{name} {sign * amplitude:+g} mode {number}", one.problem, one.x + sign * amplitude * mode)
         for amplitude in amplitudes

@@ -27,6 +27,7 @@ class Outcome(StrEnum):
     CLOSED = "closed"
     OUT_OF_RANGE = "out-of-range"
     UNFOLDED = "unfolded"
+    MAX_STARTS = "max-starts"
     EIGENVALUES_UNCONVERGED = "eigenvalues-unconverged"
 
     @property
@@ -51,6 +52,7 @@ _SUCCESS = {
     Outcome.NO_MORE_FOUND,
     Outcome.CLOSED,
     Outcome.OUT_OF_RANGE,
+    Outcome.MAX_STARTS,
 }
 
 _ADVICE = {
@@ -84,6 +86,7 @@ _ADVICE = {
     Outcome.CLOSED: "The curve came back to its start: this is all of it.",
     Outcome.OUT_OF_RANGE: "The curve leaves the values that a key can take.",
     Outcome.UNFOLDED: "The branches part when this key changes, and cross at single values only: choose another key.",
+    Outcome.MAX_STARTS: "The limit on starts was reached with others left: raise `--starts` and resume.",
     Outcome.MAX_STEPS: "The step limit was reached: raise `max_steps` or resume.",
     Outcome.EIGENVALUES_UNCONVERGED: (
         "The leading growth rates did not converge or contradict each other: raise `elements`, or ask for fewer."

@@ -64,7 +64,7 @@ StartFrom = Annotated[
     Parameter(
         name="--from",
         metavar="STORE[:LABEL]",
-        help="Start from the last state of a stored run, or a labelled one of a branch or curve.",
+        help="Start from the last state of a stored run, or a labelled one of a branch, a curve or a search.",
     ),
 ]
 

@@ -1,7 +1,8 @@
-"""States to start from: the last frame of a stored run, or a labelled point of a stored branch or curve."""
+"""States to start from: the last frame of a stored run, a labelled point of a branch or curve, a state that a search found."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from shapespace.base.errors import InputError, StoreError
@@ -12,6 +13,7 @@ from shapespace.study.frame import Frame
 from shapespace.study.keys import MODELS
 from shapespace.study.records import noun_of
 from shapespace.study.scenario import Scenario
+from shapespace.study.search_store import open_search
 from shapespace.study.store import RunStore
 
 
@@ -50,12 +52,17 @@ class Start:
 
 
 def find_start(text: str | Path) -> Start:
-    """The state that `STORE` or `STORE:LABEL` names; without a label the last one. InputError where there is none."""
-    path, label = Path(text), ""
-    if ":" in str(text) and not path.is_dir():
-        store, _, label = str(text).rpartition(":")
-        path = Path(store)
+    """The state that `STORE` or `STORE:LABEL` names; without a label the last one, but of a search none.
+
+    InputError where there is none.
+    """
+    path, label = _parts(text)
     noun = noun_of(path)
+    if noun == "search":
+        search = open_search(path)
+        frame = search[label].frame
+        assert frame is not None
+        return Start(str(text), search.scenario, frame)
     if noun == "branch":
         branch = open_branch(path)
         point = branch[label] if label else branch.points[-1]
@@ -70,3 +77,41 @@ def find_start(text: str | Path) -> Start:
     if not len(run):
         raise StoreError(f"{path}: holds no time step yet; continue the run with --resume.")
     return Start(str(text), run.scenario, run.read(-1))
+
+
+def find_starts(text: str | Path, scenario: Scenario) -> list[Start]:
+    """All states that `STORE` or `STORE:LABEL` offers to a scenario; InputError where there is none, or none that fits.
+
+    Of a search without a label all its states; of a branch its labelled points and, of neighbours with the scenario's value
+    of the key between them, the nearer one.
+    """
+    path, label = _parts(text)
+    noun = noun_of(path)
+    if label or noun not in ("branch", "search"):
+        starts = [find_start(text)]
+    elif noun == "search":
+        starts = [find_start(f"{path}:{state.label}") for state in open_search(path).states]
+    else:
+        branch = open_branch(path)
+        value = float(scenario.values().get(branch.key, float("nan")))
+        chosen = {f"{path}:{point.label}": point for point in branch.points if point.label}
+        for pair in pairwise(branch.points):
+            if (pair[0].parameter - value) * (pair[1].parameter - value) <= 0.0:
+                near = min(pair, key=lambda point: abs(point.parameter - value))
+                chosen[f"{path} at {branch.key} = {near.parameter:.8g}, arclength {near.place:.6g}"] = near
+        starts = [
+            Start(name, branch.scenario_at(point), point.frame, branch.key, point, (branch.key,))
+            for name, point in chosen.items()
+        ]
+    for start in starts:
+        start.check_fits(scenario)
+    return starts
+
+
+def _parts(text: str | Path) -> tuple[Path, str]:
+    """The directory and the label."""
+    path = Path(text)
+    if ":" in str(text) and not path.is_dir():
+        store, _, label = str(text).rpartition(":")
+        return Path(store), label
+    return path, ""

@@ -223,17 +223,24 @@ def solve_steady(scenario: Scenario, name: StateName = StateName.DEFAULT) -> Ste
     branch of states that leads on from it, through folds. Without a ring the default is the polarized, swimming state
     on the branch that leaves the sphere at the first pitchfork in the Peclet number.
     """
-    _check_has_isolated_states(scenario)
+    check_has_isolated_states(scenario)
     if scenario.model == "closed-surface":
-        sphere = scenario.with_overrides(
-            {"ring_amplitude": 0.0, "initial_background": 1.0, "initial_ring_amplitude": 0.0, "seed_amplitude": 0.0}
-        )
+        sphere = reference(scenario)
         if scenario.values()["ring_amplitude"] == 0.0:
             return _sphere(scenario, sphere) if name is StateName.TRIVIAL else _polarized(scenario, sphere)
         return _raised(scenario, _sphere(sphere, sphere), ("ring_amplitude",))
-    flat = scenario.with_overrides({"spontaneous_curvature": 0.0, "pulling_force": 0.0})
+    flat = reference(scenario)
     start = steady_from(flat, Engine.of(flat).initial_state())
     return start if name is StateName.TRIVIAL else _raised(scenario, start, ("spontaneous_curvature", "pulling_force"))
+
+
+def reference(scenario: Scenario) -> Scenario:
+    """The scenario without ring, coat and pull: its initial state, a sphere or a flat disc, is at rest."""
+    if scenario.model == "closed-surface":
+        return scenario.with_overrides(
+            {"ring_amplitude": 0.0, "initial_background": 1.0, "initial_ring_amplitude": 0.0, "seed_amplitude": 0.0}
+        )
+    return scenario.with_overrides({"spontaneous_curvature": 0.0, "pulling_force": 0.0})
 
 
 def key_values(scenario: Scenario, keys: Sequence[str]) -> Array:
@@ -321,7 +328,8 @@ def _polarized(scenario: Scenario, sphere: Scenario) -> Steady:
     return replace(resting, found=replace(resting.found, outcome=Outcome.NO_STATE), detail=detail)
 
 
-def _check_has_isolated_states(scenario: Scenario) -> None:
+def check_has_isolated_states(scenario: Scenario) -> None:
+    """InputError where stationary states come in families."""
     if scenario.model == "closed-surface" and scenario.values()["turnover_rate"] == 0.0:
         raise InputError(
             "turnover_rate = 0: conserves the regulator, so that stationary states come in families that no equation tells "

@@ -1,0 +1,153 @@
+"""Searches for stationary states as results: in memory, or in a directory whose `tries/NNNNNN.npz` hold one try each; see
+`records`.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+
+from shapespace.base.errors import InputError, StoreError
+from shapespace.base.outcome import Outcome
+from shapespace.study.frame import Array, Frame, arrays_of, frame_of_arrays, read_arrays, write_arrays
+from shapespace.study.records import AbstractRecordStore
+from shapespace.study.scenario import Scenario
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A start that a search tried, and what it led to.
+
+    place: among the tries. start: how it was made. outcome: converged for a new state, repeated for a known one, neck-closed
+    or self-intersecting for a new solution that is no physical shape, else why no solution was found. number: of the solution,
+    known or new, counted from zero. frame: of a new solution, at time zero, with its observables; label: if it is a physical
+    shape. is_mirrored: its mirror image is another state. growth_rates (m, 2): as of a `BranchPoint`, with errors (m,).
+    """
+
+    place: int
+    start: str
+    outcome: str
+    iterations: int
+    residual: float
+    number: int | None = None
+    label: str = ""
+    is_mirrored: bool = False
+    frame: Frame | None = None
+    growth_rates: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    growth_rate_errors: Array = field(default_factory=lambda: np.zeros(0))
+    parities: tuple[str | None, ...] = ()
+    neutral: dict[int, str] = field(default_factory=dict)
+    n_unstable: int | None = None
+
+    @property
+    def observables(self) -> dict[str, float]:
+        """In the scenario's units; empty without a state."""
+        return self.frame.observables if self.frame is not None else {}
+
+
+_ARRAYS = ("growth_rates", "growth_rate_errors")
+_WORDS = (
+    "place",
+    "start",
+    "outcome",
+    "iterations",
+    "number",
+    "label",
+    "is_mirrored",
+    "parities",
+    "neutral",
+    "n_unstable",
+)
+
+
+class SearchStore(AbstractRecordStore[Tried]):
+    """The tries of one search. `create` and `resume` give a store to write, `open` one to read.
+
+    The manifest's entry `search` says where it started: from which stores.
+    """
+
+    noun = "search"
+    folder = "tries"
+    note = "arrays of states are dimensionless, in units of the scales; observables and growth rates are in the scenario's units"
+
+    @staticmethod
+    def encode(record: Tried) -> bytes:
+        """The arrays of a new state's frame, and what is known of the try."""
+        words = json.dumps({name: getattr(record, name) for name in _WORDS})
+        return write_arrays(
+            {
+                **(arrays_of(record.frame) if record.frame is not None else {}),
+                **{name: getattr(record, name) for name in _ARRAYS},
+                "residual": np.array(record.residual),
+                "about": np.frombuffer(words.encode(), dtype=np.uint8),
+            }
+        )
+
+    @staticmethod
+    def decode(data: bytes) -> Tried:
+        """The try in the bytes of a file."""
+        stored = read_arrays(data)
+        about: dict[str, Any] = json.loads(stored["about"].tobytes())
+        values: dict[str, Any] = {name: about[name] for name in _WORDS} | {name: stored[name] for name in _ARRAYS}
+        values["parities"] = tuple(values["parities"])
+        values["neutral"] = {int(place): name for place, name in values["neutral"].items()}
+        frame = frame_of_arrays(stored) if "mesh" in stored else None
+        return Tried(**values, residual=float(stored["residual"]), frame=frame)
+
+    @classmethod
+    def create(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
+        """A new store in a directory that is empty or does not exist; StoreError, and nothing written, otherwise."""
+        return cls._create(path, scenario, {"search": dict(request)})
+
+    @classmethod
+    def resume(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
+        """A stored search to continue. Checks every try; scenario and request must be the same."""
+        path = Path(path)
+        manifest = cls._read_manifest(path)
+        difference = cls._scenario_of(path, manifest).difference(scenario)
+        if not difference and manifest.get("search") != dict(request):
+            difference = f"starts are {manifest.get('search')}, not {dict(request)}"
+        if difference:
+            raise StoreError(
+                f"{path}: holds a search whose {difference}; resume with the same value or choose another --out."
+            )
+        return cls._reopen(path, scenario)
+
+    def _disorder(self, previous: Tried, record: Tried) -> str | None:
+        return None if record.place == previous.place + 1 else f"try {record.place} after {previous.place}"
+
+
+@dataclass(frozen=True)
+class Search:
+    """Stationary states of a scenario that a search found. tried: every start, in order, with what it led to."""
+
+    outcome: Outcome | None
+    scenario: Scenario
+    tried: tuple[Tried, ...]
+    store: Path | None = None
+
+    @property
+    def states(self) -> tuple[Tried, ...]:
+        """The tries that found new states."""
+        return tuple(one for one in self.tried if one.label)
+
+    def label_of(self, one: Tried) -> str | None:
+        """The label of the state that a try led to, if any."""
+        return next((state.label for state in self.states if state.number == one.number), None)
+
+    def __getitem__(self, label: str) -> Tried:
+        """The state of a label; InputError lists the labels where there is none."""
+        for state in self.states:
+            if state.label == label:
+                return state
+        labels = ", ".join(state.label for state in self.states) or "another store, as it found no state"
+        raise InputError(f"{label or 'no label'}: is no state of this search; choose one of {labels}.")
+
+
+def open_search(path: str | Path) -> Search:
+    """A stored search, finished or not. StoreError where there is none."""
+    store = SearchStore.open(path)
+    return Search(store.outcome, store.scenario, (*store,), store.path)
