@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from shapespace.base.errors import InputError
 from shapespace.cli.shared import (
     GAVE_UP,
     INTERRUPTED,
@@ -23,7 +24,6 @@ from shapespace.cli.shared import (
     finite,
     print_lines,
     read_settings,
-    read_values,
     tell,
 )
 
@@ -37,19 +37,26 @@ if TYPE_CHECKING:
     help_epilogue=examples(
         "shapespace branch polar-swimmer --vary peclet --start 15 --stop 30 --out results/sphere",
         "shapespace branch polar-swimmer --vary peclet --stop 60 --from results/sphere:pitchfork-1 --side 1",
-        "shapespace branch guided-division --vary ring_amplitude --start 0 --stop 4.2 --at 1.5,2",
+        "shapespace branch guided-division --vary ring_amplitude --start 0 --stop 4.2 --at 1.5,neck_radius=0.5",
+        "shapespace branch membrane-protrusion --vary height --free pulling_force --start 0.6 --stop 1.2",
     ),
 )
 def branch_command(
     scenario: NameOrFile,
     /,
     *,
-    vary: Annotated[str, Parameter(metavar="KEY", help="The key to vary.")],
+    vary: Annotated[str, Parameter(metavar="KEY", help="The key to vary; with --free, an observable.")],
     stop: Annotated[float, Parameter(metavar="B", help="Value of the key at which the branch ends.")],
     start: Annotated[
         float | None, Parameter(metavar="A", help="Value of the key to start at; the default is that of the start.")
     ] = None,
-    at: Annotated[str | None, Parameter(metavar="V1,V2,...", help="Values of the key to stop at exactly.")] = None,
+    free: Annotated[
+        str | None, Parameter(metavar="KEY", help="The key that answers while an observable is prescribed.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        Parameter(metavar="V1,V2,...", help="Values to stop at exactly; of observables as NAME=VALUE."),
+    ] = None,
     settings: Settings = (),
     origin: StartFrom = None,
     state: Annotated[str | None, Parameter(metavar="NAME", help="Start from the default or the trivial state.")] = None,
@@ -68,7 +75,7 @@ def branch_command(
     from shapespace.study.branching import branch
     from shapespace.study.run import free_path
 
-    values = read_values(at)
+    values = _read_places(at)
     chosen = find_scenario(scenario).with_overrides(read_settings(settings))
     name = f"{chosen.name}-{vary}"
     path = out or (Path("results") / name if resume else free_path(name))
@@ -79,6 +86,7 @@ def branch_command(
             vary,
             stop,
             start=start,
+            free=free,
             at=values,
             origin=origin,
             state=state,
@@ -114,6 +122,21 @@ def _report(found: "Branch") -> int:
     return GAVE_UP
 
 
+def _read_places(text: str | None) -> list[float | tuple[str, float]]:
+    """The values of --at: numbers, and (observable, value) pairs."""
+    try:
+        return [_read_place(part) for part in text.split(",")] if text else []
+    except ValueError:
+        raise InputError(
+            f"--at {text}: must be numbers with commas between them, or NAME=VALUE of observables, e.g. --at 1.5,height=0.6."
+        ) from None
+
+
+def _read_place(text: str) -> float | tuple[str, float]:
+    name, equals, value = (part.strip() for part in text.rpartition("="))
+    return (name, float(value)) if equals else float(text)
+
+
 class _Display:
     """Where a branch stands, on stderr: a line for special points, and one now and then."""
 
@@ -140,12 +163,14 @@ def _record(found: "Branch") -> dict[str, Any]:
         **described(found.outcome, found.scenario, last),
         "store": str(found.store),
         "vary": found.key,
+        "free": found.free,
         "began": found.began,
         "special_points": [
             {
                 "label": point.label,
                 "kind": point.kind,
                 "parameter": point.parameter,
+                **_freed(found, point),
                 "parameter_error": point.parameter_error if math.isfinite(point.parameter_error) else None,
                 "observables": finite(point.observables),
                 "growth_rates": point.growth_rates.tolist(),
@@ -160,6 +185,7 @@ def _record(found: "Branch") -> dict[str, Any]:
         "points": [
             {
                 "parameter": point.parameter,
+                **_freed(found, point),
                 "observables": finite(point.observables),
                 "n_unstable": point.n_unstable,
                 "label": point.label,
@@ -169,6 +195,11 @@ def _record(found: "Branch") -> dict[str, Any]:
         ],
         "missed": list(found.missed),
     }
+
+
+def _freed(found: "Branch", point: "BranchPoint") -> dict[str, float]:
+    """The value of the key that answers, by its name, where there is one."""
+    return {} if found.free is None or point.freed is None else {found.free: point.freed}
 
 
 def _summarise(found: "Branch") -> None:

@@ -47,6 +47,11 @@ class State:
         element = np.clip(np.searchsorted(self.mesh, u, side="right") - 1, 0, len(self.mesh) - 2)
         return element, (u - self.mesh[element]) / self.widths[element]
 
+    def place(self, u: float) -> tuple[int, float]:
+        """The element of u, and u's place in it from 0 to 1."""
+        element, share = self._locate(np.array([u]))
+        return int(element[0]), float(share[0])
+
     def values(self, u: Array) -> Array:
         """Differential fields at u (m,), shape (m, n); error of order k + 1, 2k at element ends."""
         element, x = self._locate(u)

@@ -22,7 +22,8 @@ class BranchPoint:
     errors (m,), parities and names of neutral ones by place; modes (m, n), of labelled points only. n_unstable: None where
     unknown. label, kind: of special points, else empty. is_step: one of the continuation's own points, not one located
     between them. ends: outcome with which the leg ends here, else empty. missed: brackets before this point in which nothing
-    was found. began: of the first point, the name of the state, or the store, that it comes from.
+    was found. began: of the first point, the name of the state, or the store, that it comes from. freed: value of the key that
+    answers where an observable is the parameter.
     """
 
     frame: Frame
@@ -49,11 +50,17 @@ class BranchPoint:
     ends: str = ""
     missed: tuple[dict[str, Any], ...] = ()
     began: str = ""
+    freed: float | None = None
 
     @property
     def observables(self) -> dict[str, float]:
         """In the scenario's units."""
         return self.frame.observables
+
+    @property
+    def value(self) -> float:
+        """Of the scenario's key that changes along the branch."""
+        return self.parameter if self.freed is None else self.freed
 
     @property
     def place(self) -> float:
@@ -67,7 +74,7 @@ _LAYOUT = Layout(
     arrays=("tangent", "directions", "growth_rates", "growth_rate_errors", "modes"),
     words=(
         "parities", "neutral", "n_unstable", "n_unstable_before", "n_unstable_after", "leg", "label", "kind", "is_step", "ends",
-        "missed", "began",
+        "missed", "began", "freed",
     ),
 )  # fmt: skip
 

@@ -72,7 +72,7 @@ class AbstractPathStore(AbstractRecordStore[P]):
 class BranchStore(AbstractPathStore[BranchPoint]):
     """The points of one branch. `create` and `resume` give a store to write, `open` one to read.
 
-    The manifest's entry `branch` says which branch: key, start, stop, at, and how it was begun.
+    The manifest's entry `branch` says which branch: key, free, start, stop, at, and how it was begun.
     """
 
     noun = "branch"
@@ -87,8 +87,9 @@ class BranchStore(AbstractPathStore[BranchPoint]):
 
 @dataclass(frozen=True)
 class Branch:
-    """Stationary states of a scenario along a change of one key. points: in the order of the branch, special ones included.
+    """Stationary states of a scenario along a change of one key, or of an observable while a key `free` answers.
 
+    points: in the order of the branch, special ones included.
     detail: of a start that failed in this session, how near to a solution it came.
     """
 
@@ -98,6 +99,7 @@ class Branch:
     points: tuple[BranchPoint, ...]
     store: Path | None = None
     detail: str = ""
+    free: str | None = None
 
     @property
     def special_points(self) -> tuple[BranchPoint, ...]:
@@ -124,7 +126,7 @@ class Branch:
 
     def scenario_at(self, point: BranchPoint) -> Scenario:
         """The scenario whose stationary state a point is."""
-        return self.scenario.with_overrides({self.key: point.parameter})
+        return self.scenario.with_overrides({self.free or self.key: point.value})
 
 
 def open_branch(path: str | Path) -> Branch:
@@ -132,11 +134,17 @@ def open_branch(path: str | Path) -> Branch:
     store = BranchStore.open(path)
     if not len(store):
         raise StoreError(f"{path}: holds no point yet; continue the branch with --resume.")
-    return collected(store.scenario, store.request["key"], [*store], store.outcome, store.path)
+    request = store.request
+    return collected(store.scenario, request["key"], request.get("free"), [*store], store.outcome, store.path)
 
 
 def collected(
-    scenario: Scenario, key: str, points: Sequence[BranchPoint], outcome: Outcome | None, store: Path | None
+    scenario: Scenario,
+    key: str,
+    free: str | None,
+    points: Sequence[BranchPoint],
+    outcome: Outcome | None,
+    store: Path | None,
 ) -> Branch:
     """A branch from its points in the order in which they were computed."""
-    return Branch(outcome, scenario, key, tuple(sorted(points, key=lambda point: point.place)), store)
+    return Branch(outcome, scenario, key, tuple(sorted(points, key=lambda point: point.place)), store, free=free)

@@ -17,13 +17,15 @@ from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START, Branch, BranchStore, collected
+from shapespace.study.course import Course
 from shapespace.study.engine import Engine, state_of
-from shapespace.study.keyed import KeyedProblem
+from shapespace.study.keyed import HeldProblem, KeyedProblem
 from shapespace.study.landmarks import Surveyor, physical_end
+from shapespace.study.measures import make_observable
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import Start, find_start
-from shapespace.study.steady import StateName, Steady, key_values, steady, steady_near
+from shapespace.study.steady import MAX_POINTS, StateName, Steady, key_values, steady, steady_near
 
 FIRST_STEP = 0.02
 ENDS = (Outcome.REACHED_STOP, Outcome.NECK_CLOSED, Outcome.SELF_CONTACT, Outcome.SELF_INTERSECTING)
@@ -45,6 +47,8 @@ Progress = Callable[[BranchPoint, int], None]
 class Request:
     """Which branch to follow: from start to stop in a key, with exact points at `at`.
 
+    free: the key that answers where `key` is an observable. at: values of the key, and (observable, value) pairs.
+
     origin: stored state to begin at, as text; without it the state of this name, or the default one, or where there is none
     the trivial one. side: 1 or -1 for either way along the other branch through a stored branch
     point, 0 for the branch itself. both: also the other way, as far as from stop to start on the other side. stability:
@@ -54,12 +58,13 @@ class Request:
     key: str
     start: float
     stop: float
-    at: tuple[float, ...] = ()
+    at: tuple[float | tuple[str, float], ...] = ()
     origin: str | None = None
     state: str | None = None
     side: int = 0
     both: bool = False
     stability: bool = True
+    free: str | None = None
 
     def __post_init__(self) -> None:
         if self.side not in (-1, 0, 1):
@@ -72,9 +77,28 @@ class Request:
             raise InputError(
                 f"--stop {self.stop:g}: must differ from the start, {self.start:g}; choose another --stop."
             )
-        for name, value in (("--start", self.start), ("--stop", self.stop), *(("--at", one) for one in self.at)):
+        at = (("--at", one if isinstance(one, float) else one[1]) for one in self.at)
+        for name, value in (("--start", self.start), ("--stop", self.stop), *at):
             if not np.isfinite(value):
                 raise InputError(f"{name} {value}: must be a finite number; give one.")
+
+    @property
+    def course(self) -> Course:
+        """What varies."""
+        return Course(self.key, self.free)
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Of what varies, where to stop."""
+        return tuple(dict.fromkeys(one for one in self.at if isinstance(one, float) and one not in self.bounds))
+
+    def stops(self, scenario: Scenario) -> list[Stop]:
+        """The ends and the exact points."""
+        stops = [Stop(Parameter(0), value, "end", ends=True) for value in dict.fromkeys(self.bounds)]
+        stops += [Stop(Parameter(0), value, "user") for value in self.values]
+        for name, value in (one for one in self.at if not isinstance(one, float)):
+            stops.append(Stop(make_observable(scenario, name, self.course.moved), value, "user"))
+        return stops
 
     @property
     def direction(self) -> float:
@@ -99,7 +123,8 @@ def branch(
     stop: float,
     *,
     start: float | None = None,
-    at: Sequence[float] = (),
+    free: str | None = None,
+    at: Sequence[float | tuple[str, float]] = (),
     origin: str | Path | None = None,
     state: str | None = None,
     side: int = 0,
@@ -112,23 +137,26 @@ def branch(
 ) -> Branch:
     """Follow the stationary state of a scenario while one key goes from start to stop, through folds; returns the Branch.
 
+    With a key `free`, `key` may be an observable: it is prescribed, and the free key takes the value that this needs; growth
+    rates are those under this control. at: exact values of the key, or (observable, value) pairs, to have points at.
     start: the key's value to begin with; without it the scenario's. The first state is the scenario's named one there, or
     what the stored state `origin` (`STORE` or `STORE:LABEL`) becomes; see `Request` for state, side, both and stability. `out` is
     the directory of the store, new or empty; with `resume` a store there is continued, to the same points as if it had
     never been interrupted. The outcome says how the branch ended. InputError before anything is computed.
     """
     known = find_start(origin) if origin is not None else None
-    value = _first_value(scenario, key, start, known)
+    value = _first_value(scenario, Course(key, free), start, known)
     text = None if origin is None else str(origin)
-    request = Request(key, value, float(stop), tuple(map(float, at)), text, state, side, both, stability)
+    places = tuple((one[0], float(one[1])) if isinstance(one, tuple) else float(one) for one in at)
+    request = Request(key, value, float(stop), places, text, state, side, both, stability, free)
     scenario = _checked(scenario, request, known)
     if out is None:
         if resume:
             raise InputError("resume = True: needs the directory of a stored branch; give it as out.")
         points: list[BranchPoint] = []
         end = _follow(scenario, request, known, points, points.append, progress)
-        return replace(collected(scenario, key, points, end.outcome, None), detail=end.detail)
-    described = {**asdict(request), "at": list(request.at)}
+        return replace(collected(scenario, key, free, points, end.outcome, None), detail=end.detail)
+    described = {**asdict(request), "at": [list(one) if isinstance(one, tuple) else one for one in request.at]}
     begin = BranchStore.resume if resume and holds_store(out) else BranchStore.create
     with begin(out, scenario, described) as store:
         points = [*store]
@@ -144,30 +172,34 @@ def branch(
             end = _follow(scenario, request, known, points, keep, progress)
             store.finish(end.outcome)
             detail = end.detail
-        return replace(collected(scenario, key, points, store.outcome, store.path), detail=detail)
+        return replace(collected(scenario, key, free, points, store.outcome, store.path), detail=detail)
 
 
-def _first_value(scenario: Scenario, key: str, start: float | None, known: Start | None) -> float:
-    KeyedProblem.of(scenario, (key,))  # an InputError where the key cannot vary
+def _first_value(scenario: Scenario, course: Course, start: float | None, known: Start | None) -> float:
+    course.check(scenario)
     if start is not None:
         return float(start)
-    if known is not None and known.key == key and known.point is not None:
+    if known is not None and known.key == course.key and known.point is not None:
         return known.point.parameter
-    return float(key_values(scenario, (key,))[0])
+    if course.free is not None:
+        raise InputError(f"--vary {course.key}: is an observable; give the value to start at as --start.")
+    return float(key_values(scenario, (course.key,))[0])
 
 
 def _checked(scenario: Scenario, request: Request, known: Start | None) -> Scenario:
     """The scenario at the start; InputError where a value, or the stored start, is not possible."""
-    for value in {request.stop, *request.at, *request.bounds}:
+    for value in {request.stop, *request.values, *request.bounds} if request.free is None else ():
         scenario.with_overrides({request.key: value})
+    request.stops(scenario)  # an InputError where an observable is none
     if request.side:
         point = known.point if known is not None else None
-        if point is None or known is None or known.key != request.key or point.kind not in {*Kind} - {Kind.FOLD}:
+        if point is None or known is None or not _is_on(known, request) or point.kind not in {*Kind} - {Kind.FOLD}:
             raise InputError(
                 f"--from {request.origin}: is no pitchfork, transcritical or branch point in {request.key}, so that no other "
                 "branch leaves there; choose another label, or --side 0."
             )
-    scenario = scenario.with_overrides({request.key: request.start})
+    if request.free is None:
+        scenario = scenario.with_overrides({request.key: request.start})
     if known is not None:
         known.check_fits(scenario)
     return scenario
@@ -182,7 +214,7 @@ def _follow(
     progress: Progress | None,
 ) -> _End:
     """Compute what is missing of a branch of which the points `done` are there; `keep` lengthens them."""
-    surveyor = Surveyor(scenario, request.key, request.stability, done)
+    surveyor = Surveyor(scenario, request.course, request.stability, done)
 
     def record(point: BranchPoint) -> None:
         keep(point)
@@ -215,10 +247,8 @@ def _leg(
         surveyor.outcome = end
         yield surveyor.end(past[-1], past[-1], end)
         return
-    stops = [Stop(Parameter(0), value, "end", ends=True) for value in dict.fromkeys(request.bounds)]
-    stops += [Stop(Parameter(0), value, "user") for value in dict.fromkeys(request.at) if value not in request.bounds]
     options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
-    continuation = Continuation(past, stops, options)
+    continuation = Continuation(past, request.stops(surveyor.scenario), options)
     last = past[-1]
     for point in continuation:
         end = physical_end(point)
@@ -249,15 +279,17 @@ def _start(scenario: Scenario, request: Request, known: Start | None) -> tuple[P
     if not found.outcome.is_success:
         return _End(found.outcome, f"No state to start from: {found.nearest}")
     first = _begun(_start_at(found, request))
+    if isinstance(first, Point) and request.free is not None and first.parameter != request.start:
+        first = _moved(first, request)
     return first if isinstance(first, _End) else (first, name)
 
 
 def _stored_start(scenario: Scenario, request: Request, known: Start) -> Point | _End | None:
     """The stored point itself, if it is one of a branch in this key of this very scenario."""
     options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
-    if known.point is None or known.key != request.key or not _is_at(known, scenario):
+    if known.point is None or not _is_on(known, request) or not _is_at(known, scenario):
         return None
-    problem, place = _placed(scenario, request.key, known.point)
+    problem, place = _placed(scenario, request.course, known.point)
     if request.side:
         return side_branches(_singular(known.point, problem, place), known.point.tangent, FIRST_STEP)[
             0 if request.side > 0 else 1
@@ -284,8 +316,30 @@ def _named(scenario: Scenario, state: str | None) -> tuple[str, Steady]:
 def _start_at(found: Steady, request: Request) -> Point | Outcome:
     """The first point at a solution."""
     options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
-    problem = replace(KeyedProblem.of(found.scenario, (request.key,)), base=found.problem.base)
-    return start_point(problem, found.found.x, np.array([request.start]), 0, request.direction, options)
+    problem, x, value = request.course.problem(found.scenario, found.problem.base), found.found.x, request.start
+    if isinstance(problem, HeldProblem):
+        x = np.append(x, float(key_values(found.scenario, (request.course.moved,))[0]))
+        value = problem.measure.value(problem, x, np.zeros(1))
+    direction = float(np.sign(request.start - value)) or request.direction
+    return start_point(problem, x, np.array([value]), 0, direction, options)
+
+
+def _moved(first: Point, request: Request) -> Point | _End:
+    """The first point, from a state whose observable has another value, along the branch to where it has that of the start."""
+    stops = [Stop(Parameter(0), request.start, "end", ends=True)]
+    options = Arclength(first=FIRST_STEP, parameter_scale=abs(request.start - first.parameter), max_points=MAX_POINTS)
+    branch = Continuation([first], stops, options)
+    *_, last = [first, *branch]
+    if branch.outcome is not Outcome.REACHED_STOP:
+        met = f"{request.key} = {first.parameter:.8g} of the state there could be brought to {last.parameter:.8g} only."
+        return _End(Outcome.NOT_REACHED, f"No state with {request.key} = {request.start:g} to start from: {met}")
+    turned = last.tangent[-1] * request.direction < 0.0
+    return replace(last.reversed() if turned else last, arclength=0.0, step=FIRST_STEP, label="start")
+
+
+def _is_on(known: Start, request: Request) -> bool:
+    """Whether a stored state is one of a branch in what this one varies."""
+    return known.key == request.key and request.course.moved in known.keys
 
 
 def _is_at(known: Start, scenario: Scenario) -> bool:
@@ -293,15 +347,16 @@ def _is_at(known: Start, scenario: Scenario) -> bool:
     return known.scenario.parameters == scenario.parameters and known.scenario.numerics == scenario.numerics
 
 
-def _placed(scenario: Scenario, key: str, point: BranchPoint) -> tuple[KeyedProblem, Point]:
+def _placed(scenario: Scenario, course: Course, point: BranchPoint) -> tuple[KeyedProblem | HeldProblem, Point]:
     """A stored point as one to go on from."""
-    problem = KeyedProblem.of(scenario, (key,))
-    problem = replace(problem, base=problem.base.on_mesh(point.frame.mesh))
+    problem = course.problem(scenario, Engine.of(scenario).problem.on_mesh(point.frame.mesh))
     return problem, _point(problem, point)
 
 
-def _point(problem: KeyedProblem, point: BranchPoint) -> Point:
+def _point(problem: KeyedProblem | HeldProblem, point: BranchPoint) -> Point:
     x = problem.base.pack(state_of(point.frame))
+    if point.freed is not None:
+        x = np.append(x, point.freed)
     return Point(
         problem,
         x,
@@ -315,7 +370,7 @@ def _point(problem: KeyedProblem, point: BranchPoint) -> Point:
     )
 
 
-def _singular(point: BranchPoint, problem: KeyedProblem, place: Point) -> SingularPoint:
+def _singular(point: BranchPoint, problem: KeyedProblem | HeldProblem, place: Point) -> SingularPoint:
     return SingularPoint(
         Kind(point.kind), problem, 0, place.x, place.p, point.parameter_error, point.directions, point.directions
     )
@@ -326,11 +381,11 @@ def _past(surveyor: Surveyor, done: Sequence[BranchPoint], leg: int) -> list[Poi
     start = next(point for point in done if point.label == START)
     steps = [point for point in done if point.leg == leg and point.is_step and point.label != START]
     chosen = [start, *steps][-MEMORY:]
-    base = KeyedProblem.of(surveyor.scenario, (surveyor.key,))
-    problem, points = base, []
+    problem, points = surveyor.course.problem(surveyor.scenario), []
     for point in chosen:
         if not np.array_equal(problem.base.mesh, point.frame.mesh):
-            problem = replace(base, base=Engine.of(surveyor.scenario).problem.on_mesh(point.frame.mesh))
+            mesh = Engine.of(surveyor.scenario).problem.on_mesh(point.frame.mesh)
+            problem = surveyor.course.problem(surveyor.scenario, mesh)
         place = _point(problem, point)
         points.append(place.reversed() if leg and point is start else place)
     return points

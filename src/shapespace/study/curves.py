@@ -341,7 +341,7 @@ class _Recorder:
         pair = (np.append(system.kernel[0], 0.0),) if system.is_fold else branches_at(point)
         missed, self._missed = tuple(self._missed), []
         return CurvePoint(
-            frame=frame_of(state.problem, state.x, observables_at(at, state.problem, state.x)),
+            frame=frame_of(state.problem.base, state.x, observables_at(at, state.problem.base, state.x)),
             parameters=state.p,
             parameter_errors=np.array(errors),
             unfolding=0.0 if system.is_fold else float(point.x[-1]),

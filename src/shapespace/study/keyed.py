@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from shapespace.analysis.controlled import ControlledProblem
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
 from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Border, Rate
@@ -87,6 +88,14 @@ class KeyedProblem(AbstractSmoothProblem):
         """On the scenario's initial mesh."""
         return cls(Engine.of(scenario).problem, keys, make_powers(scenario, keys))
 
+    def surface(self, x: Array) -> Array:
+        """The part of x that is the state of the surface: all of it."""
+        return x
+
+    def key_value(self, x: Array, p: Array) -> float:
+        """The value of the first key."""
+        return float(p[0])
+
     def residual(self, x: Array, p: Array, rate: Rate) -> Array:
         """Of the base."""
         return self.base.residual(x, self.powers.value(p), rate)
@@ -145,3 +154,23 @@ class KeyedProblem(AbstractSmoothProblem):
     def reflected(self, x: Array, increment: bool = False) -> Array | None:
         """Of the base."""
         return self.base.reflected(x, increment)
+
+
+@dataclass(frozen=True)
+class HeldProblem(ControlledProblem):
+    """A KeyedProblem with an observable prescribed: its first key becomes an unknown, the last of x."""
+
+    inner: KeyedProblem
+
+    @property
+    def base(self) -> CollocationProblem:
+        """The collocation problem."""
+        return self.inner.base
+
+    def surface(self, x: Array) -> Array:
+        """The part of x that is the state of the surface."""
+        return x[:-1]
+
+    def key_value(self, x: Array, p: Array) -> float:
+        """The value of the key that answers."""
+        return float(x[-1])

@@ -15,7 +15,8 @@ from shapespace.base.outcome import Outcome
 from shapespace.geometry.contact import crosses_itself
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
-from shapespace.study.keyed import KeyedProblem
+from shapespace.study.course import Course
+from shapespace.study.keyed import HeldProblem, KeyedProblem
 from shapespace.study.observables import CLOSING_RADIUS, neck_radius
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
@@ -31,9 +32,9 @@ OUTLINE = 6
 
 def physical_end(point: Point) -> Outcome | None:
     """Why no physical shape lies beyond a point, if so: its neck has closed, or its outline crosses itself."""
-    assert isinstance(point.problem, KeyedProblem)
+    assert isinstance(point.problem, KeyedProblem | HeldProblem)
     base = point.problem.base
-    state, fields = base.unpack(point.x), base.system.fields
+    state, fields = base.unpack(point.problem.surface(point.x)), base.system.fields
     r = fields.index("r")
     neck = neck_radius(state, r)
     if neck is not None and neck < CLOSING_RADIUS:
@@ -56,8 +57,8 @@ def physical_end(point: Point) -> Outcome | None:
 class Surveyor:
     """Makes the records of a branch: each point with its growth rates, and the special points on the way to it."""
 
-    def __init__(self, scenario: Scenario, key: str, stability: bool, done: Sequence[BranchPoint]) -> None:
-        self.scenario, self.key, self.stability = scenario, key, stability
+    def __init__(self, scenario: Scenario, course: Course, stability: bool, done: Sequence[BranchPoint]) -> None:
+        self.scenario, self.course, self.stability = scenario, course, stability
         self.outcome = Outcome.MAX_STEPS
         self._leg = 0
         self._numbers = Counter(point.kind for point in done if point.label)
@@ -198,14 +199,14 @@ class Surveyor:
         return self._ahead[1]
 
     def _solve(self, point: Point, near: Spectrum | None) -> Spectrum:
-        assert isinstance(point.problem, KeyedProblem)
+        assert isinstance(point.problem, KeyedProblem | HeldProblem)
         return spectrum_at(point.problem, point.x, point.p, near=near)
 
     def _spectrum_of(self, point: BranchPoint) -> Spectrum | None:
         """What a stored point keeps of its spectrum."""
         if not self.stability:
             return None
-        unit = self.scenario.with_overrides({self.key: point.parameter}).scales.factor("time")
+        unit = self.course.scenario_at(self.scenario, point.value).scales.factor("time")
         rates = point.growth_rates @ np.array([1.0, 1.0j]) * unit
         outcome = Outcome.EIGENVALUES_UNCONVERGED if point.n_unstable is None else Outcome.CONVERGED
         return Spectrum(
@@ -224,8 +225,10 @@ class Surveyor:
 
     def _record(self, point: Point, spectrum: Spectrum | None, **more: Any) -> BranchPoint:
         """A point with what is known of it; modes where it has a label."""
-        assert isinstance(point.problem, KeyedProblem)
-        at = self.scenario.with_overrides({self.key: point.parameter})
+        problem = point.problem
+        assert isinstance(problem, KeyedProblem | HeldProblem)
+        surface, value = problem.surface(point.x), problem.key_value(point.x, point.p)
+        at = self.course.scenario_at(self.scenario, value)
         known: dict[str, Any] = {"growth_rates": np.zeros((0, 2)), "growth_rate_errors": np.zeros(0), "next_shift": 0.0}
         if spectrum is not None:
             rates = Rates.of(spectrum, at)
@@ -238,9 +241,10 @@ class Surveyor:
                 "n_unstable": rates.n_unstable,
             }
             if more["label"]:
-                known["modes"] = spectrum.modes
+                known["modes"] = spectrum.modes[:, : len(surface)]
         return BranchPoint(
-            frame=frame_of(point.problem, point.x, observables_at(at, point.problem, point.x)),
+            frame=frame_of(problem.base, surface, observables_at(at, problem.base, surface)),
+            freed=None if self.course.free is None else value,
             parameter=point.parameter,
             arclength=point.arclength,
             step=point.step,

@@ -30,9 +30,9 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
         "max_meridional_curvature": peaks["curvature"],
         **{name: integrals[name] for name in ("area", "bending_energy", "dissipation", "energy", "external_power")},
     }
-    neck = neck_radius(state, column["r"])
-    if neck is not None:
-        out["neck_radius"] = neck
+    radius = neck_radius(state, column["r"])
+    if radius is not None:
+        out["neck_radius"] = radius
     if "p" in scalars:
         out |= _closed(engine, state, column, integrals, scalars)
     else:
@@ -76,11 +76,17 @@ def _samples(state: State) -> Array:
 
 def neck_radius(state: State, r: int) -> float | None:
     """The smallest r at an interior local minimum of r(u), r being field number `r`; None without one."""
+    found = neck(state, r)
+    return None if found is None else found[1]
+
+
+def neck(state: State, r: int) -> tuple[float, float] | None:
+    """Where r(u) has its smallest interior local minimum, and its value there; None without one."""
     u = _samples(state)
     values = state.values(u)[:, r]
     inner = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1
-    radii = [-_largest_between(state, r, -1.0, u[i - 1], u[i + 1])[1] for i in inner]
-    return min(radii) if radii else None
+    found = [_largest_between(state, r, -1.0, u[i - 1], u[i + 1]) for i in inner]
+    return min(((place, -value) for place, value in found), key=lambda one: one[1], default=None)
 
 
 def largest_value(state: State, field: int) -> tuple[float, float]:

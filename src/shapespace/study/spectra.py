@@ -5,15 +5,18 @@ import numpy as np
 from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
 from shapespace.base.arrays import Array
 from shapespace.numerics.state import State
-from shapespace.study.keyed import KeyedProblem
+from shapespace.study.keyed import HeldProblem, KeyedProblem
 
 AMOUNT = "regulator-amount"
 """Without turnover the amount of the regulator is free: states with a little more of it are states as well."""
 
 
-def spectrum_at(problem: KeyedProblem, x: Array, p: Array, *, count: int = 6, near: Spectrum | None = None) -> Spectrum:
+def spectrum_at(
+    problem: KeyedProblem | HeldProblem, x: Array, p: Array, *, count: int = 6, near: Spectrum | None = None
+) -> Spectrum:
     """Leading growth rates and modes, dimensionless, with the neutral ones of conservation laws by name."""
-    return solve_spectrum(problem, x, p, Spectral(count=count), near=near, conserved=_conserved(problem, x, p))
+    conserved = _conserved(problem, x, p) if isinstance(problem, KeyedProblem) else {}
+    return solve_spectrum(problem, x, p, Spectral(count=count), near=near, conserved=conserved)
 
 
 def _conserved(problem: KeyedProblem, x: Array, p: Array) -> dict[str, Array]:

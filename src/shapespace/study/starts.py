@@ -21,7 +21,8 @@ from shapespace.study.store import RunStore
 class Start:
     """A stored state, and the scenario whose state it is.
 
-    key, point: of a branch; a point of a curve as one of the branch in its first key. keys: that vary there.
+    key, point: of a branch; a point of a curve as one of the branch in its first key. keys: of the scenario that
+    change there; where the key is an observable that the branch prescribes, the one that answers.
     """
 
     text: str
@@ -66,7 +67,7 @@ def find_start(text: str | Path) -> Start:
     if noun == "branch":
         branch = open_branch(path)
         point = branch[label] if label else branch.points[-1]
-        return Start(str(text), branch.scenario_at(point), point.frame, branch.key, point, (branch.key,))
+        return Start(str(text), branch.scenario_at(point), point.frame, branch.key, point, (branch.free or branch.key,))
     if noun == "curve":
         curve = open_curve(path)
         place = curve[label] if label else curve.points[-1]

@@ -19,6 +19,7 @@ from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
+from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.newton import Newton
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, state_of
@@ -95,7 +96,7 @@ class Steady:
     @property
     def observables(self) -> dict[str, float]:
         """By their contract names, in the scenario's units."""
-        return observables_at(self.scenario, self.problem, self.found.x)
+        return observables_at(self.scenario, self.problem.base, self.found.x)
 
     def spectrum(self, count: int = 6) -> Spectrum:
         """Leading growth rates and modes, dimensionless."""
@@ -132,24 +133,24 @@ class Steady:
     @property
     def frame(self) -> Frame:
         """The state as a frame at time zero, to store or to start from."""
-        return frame_of(self.problem, self.found.x, self.observables)
+        return frame_of(self.problem.base, self.found.x, self.observables)
 
     def perturbed(self, amplitude: float, mode: int = 0, count: int = 6) -> Start:
         """The state x + amplitude Re(m) for a run to start from, m the mode of unit size of the leading rate number `mode`."""
         x = self.found.x + amplitude * self.spectrum(count).modes[mode].real
-        return Start("a perturbed state", self.scenario, frame_of(self.problem, x, self.observables))
+        return Start("a perturbed state", self.scenario, frame_of(self.problem.base, x, self.observables))
 
 
-def observables_at(scenario: Scenario, problem: KeyedProblem, x: Array) -> dict[str, float]:
+def observables_at(scenario: Scenario, problem: CollocationProblem, x: Array) -> dict[str, float]:
     """Observables of a state of the scenario at rest, in its units."""
-    engine = replace(Engine.of(scenario), problem=problem.base)
-    values = measure(engine, x, Rate.of_growth(problem.base.stored(x, engine.p)))
+    engine = replace(Engine.of(scenario), problem=problem)
+    values = measure(engine, x, Rate.of_growth(problem.stored(x, engine.p)))
     return {name: value * scenario.scales.factor(name) for name, value in values.items()}
 
 
-def frame_of(problem: KeyedProblem, x: Array, observables: dict[str, float]) -> Frame:
+def frame_of(problem: CollocationProblem, x: Array, observables: dict[str, float]) -> Frame:
     """A state at rest as a frame."""
-    state = problem.base.unpack(x)
+    state = problem.unpack(x)
     still = np.zeros((*state.slopes.shape[:2], 2))
     return Frame(
         0.0, 0.0, 0.0, state.mesh, state.nodes, state.slopes, state.algebraic, state.scalars, still, observables
@@ -200,7 +201,13 @@ def steady_near(scenario: Scenario, start: Start) -> Steady:
 def _singular_at(scenario: Scenario, start: Start) -> Steady | None:
     """A stored fold or branch point as the solution of its defining system; None for other states, and on other meshes."""
     point = start.point
-    if point is None or start.key is None or point.kind not in (*Kind,) or start.scenario.numerics != scenario.numerics:
+    if (
+        point is None
+        or start.key is None
+        or start.key not in start.keys
+        or point.kind not in (*Kind,)
+        or start.scenario.numerics != scenario.numerics
+    ):
         return None
     problem = KeyedProblem.of(scenario, (start.key,))
     problem = replace(problem, base=problem.base.on_mesh(point.frame.mesh))
