@@ -173,7 +173,7 @@ class _Searcher:
         if not trial.is_new:
             return bare
         problem = _keyed(found)
-        frame = frame_of(problem, found.x, observables_at(self.scenario, problem, found.x))
+        frame = frame_of(problem.base, found.x, observables_at(self.scenario, problem.base, found.x))
         unphysical = self._unphysical(found)
         if unphysical is not None:
             return replace(bare, outcome=unphysical.value, frame=frame)
