@@ -120,17 +120,21 @@ def draw(swimmers: dict[float, ss.Branch], across: ss.Branch | None, out: Path) 
     with style.house_style():
         figure, axes = panels((1.0, 1.0, 1.0, 1.4), 65.0)
         if across is not None:
-            for name, colour in (("polarity", COLOURS[1]), ("velocity", style.GREEN)):
-                draw_lines(axes[2], across.points, name, colour=colour)
-                axes[2].plot([], [], color=colour, label=label(name))
-            axes[2].legend()
+            twin = axes[2].twinx()
+            twin.spines["right"].set_visible(True)
+            for place, name, colour in ((axes[2], "polarity", style.ORANGE), (twin, "velocity", style.GREEN)):
+                draw_lines(place, across.points, name, colour=colour)
+                place.set_ylabel(label(name), color=colour)
+            twin.set_ylim(-40.0, 0.0)
+            axes[2].set_ylim(0.0, 1.0)
+            axes[2].set_title("Pe = 300")
         axes[2].set_xlabel(style.math_symbol("R0/L_h"))
         for place, name in enumerate(("velocity", "polarity")):
             for (length, branch), colour in zip(swimmers.items(), COLOURS, strict=False):
                 draw_lines(axes[place], branch.points, name, colour=colour)
                 axes[place].plot([], [], color=colour, label=f"$R_0/L_h$ = {length:g}")
             axes[place].plot(ONSET, 0.0, MARKS["pitchfork"], color=style.INK, ms=3.5)
-            axes[place].set_xlabel(label(PECLET))
+            axes[place].set_xlabel(label(PECLET, "Péclet number"))
         axes[0].set_ylabel(f"{label('velocity', 'swimming speed')} $(R_0/\\tau)$")
         axes[1].set_ylabel(label("polarity"))
         axes[0].legend()

@@ -9,7 +9,7 @@ the linearised dynamics, and ramp the dynamics slowly up and down through the tr
 Parameters: Table 5, k = 45, R0/L_h = 0.3, c_s = 10, w^2 = 0.02. Pe = 450 as in Fig. 6; the other slices are not named
 in the text, 300 and 150 are ours. Units: R0, kappa, tau = eta_b R0^2/kappa, c0.
 
-Run:   python experiments/fig_7b.py [--quick] [--out DIR]        Time: 4 min on one core, --quick 10 s.
+Run:   python experiments/fig_7b.py [--quick] [--out DIR]        Time: 2 min on one core, --quick 5 s.
 
 Expect, at Pe = 450: folds at Delta_c = 2.36247419 and 1.29348538, which AUTO-07p (benchmarks/auto) finds as well; the
 ellipsoid is stable up to the first; the dumbbell is stable from a pitchfork at 1.43472135 on, not from the second fold:
@@ -175,7 +175,7 @@ def draw(branches: dict[float, ss.Branch], loops: dict[str, list[dict[str, float
                 ("v", "none", "ramp down"),
             )
         ]
-        right.legend(handles=handles, ncols=3, loc="lower center")
+        figure.legend(handles=handles, ncols=5, loc="outside lower center")
         states = [point for point in branches[450.0].special_points if point.kind == "user"]
         names = ["ellipsoid, stable", "unstable", "dumbbell, stable"]
         draw_states(right, branches[450.0], states, names)

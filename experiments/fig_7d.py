@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, NullFormatter
 
 import shapespace as ss
 from common import COLOURS, Row, draw_states, labelled, main, panels, resumed_branch, save
@@ -118,6 +119,10 @@ def draw(branches: dict[float, ss.Branch], out: Path) -> None:
                 left.plot(point.parameter, point.observables[NECK], MARKS["pitchfork"], color=colour, ms=3.5)
         left.set_xscale("log")
         left.set_yscale("log")
+        for axis, ticks in ((left.xaxis, (0.3, 0.5, 1.0, 2.0, 3.0, 5.0)), (left.yaxis, (0.003, 0.01, 0.03, 0.1))):
+            axis.set_major_locator(FixedLocator(ticks))
+            axis.set_major_formatter("{x:g}")
+            axis.set_minor_formatter(NullFormatter())
         left.set_xlabel(style.math_symbol("R0/L_h"))
         left.set_ylabel("neck radius $r(u = 1/2)$ $(R_0)$")
         handles = [

@@ -91,7 +91,7 @@ def draw(curves: dict[float, tuple[Array, Array, float]], out: Path) -> None:
             )
             place.set_title(f"$k$ = {value:g}: {'stable' if rate < 0.0 else 'unstable'}")
             place.set_xlabel(r"time $t$ $(\tau)$")
-            place.set_ylabel(r"$\||f - f_0|\|$")
+            place.set_ylabel(r"$\| f - f_0 \|$")
             place.legend()
         save(figure, out, "fig_s2")
 

@@ -169,7 +169,9 @@ class Surveyor:
         """Say where the number of growing modes changes by more than the special points explain."""
         if self._last is None or self._last.n_unstable is None or spectrum.n_unstable is None:
             return
-        most = sum(2 if isinstance(one, Hopf) else 1 for one in found)
+        # A rate that vanishes at one of the two, as where a branch leaves another, may be counted at the other.
+        most = abs(len(spectrum.neutral) - len(self._last.neutral))
+        most += sum(2 if isinstance(one, Hopf) else 1 for one in found)
         is_told = any(one["parameter_before"] == before.parameter for one in self._missed)
         if abs(spectrum.n_unstable - self._last.n_unstable) > most and not is_told:
             self._miss(CHANGE, before, after, Outcome.NOT_REACHED)
