@@ -3,7 +3,7 @@
 Both start from the sphere on 60 elements of 4 Gauss points with the mesh moved along, and locate the folds. They differ in
 what they do besides: ours refines to a tolerance and locates the branch points too; AUTO keeps 60 intervals and
 looks for none (peer_auto.py says why). Then ours with the leading growth rates at every point, which AUTO does not
-offer for boundary value problems, and 100 points of Bratu's problem.
+offer for boundary value problems, 100 points of Bratu's problem, and 40 points of the fold curve of Chan's problem with its cusp.
 
 Times are processor time on one core, everything compiled, the better of two.
 Run from the root: python -m benchmarks.bench_branch   (about two minutes)
@@ -11,7 +11,7 @@ Run from the root: python -m benchmarks.bench_branch   (about two minutes)
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from benchmarks.timing import machine, use_one_core
 
@@ -21,11 +21,12 @@ import time
 
 import numpy as np
 from benchmarks.peer_auto import MISSING, STEPS, auto_directory, run_auto
-from tests.classic import at_rest, bratu
+from tests.classic import at_rest, bratu, chan
 
 from shapespace.analysis.bifurcation import Kind, SingularPoint
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
+from shapespace.analysis.curves import Special, own_parameter, start_curve, traced_curve
 from shapespace.analysis.extended import Parameter
 from shapespace.analysis.stability import Spectrum, solve_spectrum
 from shapespace.analysis.stationary import solve_stationary
@@ -37,8 +38,12 @@ from shapespace.study.keyed import KeyedProblem
 from shapespace.study.scenario import scenario
 
 KEY, END = "ring_amplitude", 4.2
+CHAN_CUSP = (4.1909181064, 0.0282060679)
+"""(a, b); references/continuation.md, row 5."""
 BRATU_FOLD = 3.513830719125161
 """Exact; tests/classic.py."""
+
+Made = TypeVar("Made")
 
 
 class Branch(NamedTuple):
@@ -103,8 +108,28 @@ def bratu_branch() -> Branch:
     return followed(problem, at_rest(problem), Arclength(first=0.05, largest=0.05, max_points=99))
 
 
-def timed(work: Callable[[], Branch]) -> tuple[Branch, float]:
-    """A branch and the better of two processor times, when everything is compiled."""
+def chan_fold() -> SingularPoint:
+    """The first fold at b = 0.01, to begin the curve at."""
+    problem = chan()
+    found = solve_stationary(problem, at_rest(problem), np.array([0.0, 0.01]))
+    start = start_point(found.problem, found.x, found.p, 0)
+    assert isinstance(start, Point)
+    return next(one.point for one in traced(Continuation([start])) if isinstance(one, Located))
+
+
+def fold_curve(fold: SingularPoint) -> list[Point | Special]:
+    """40 points in (a, b), special points located with their errors."""
+    options = Arclength(first=0.02, largest=0.05, parameter_scale=0.02, max_points=39)
+    start = start_curve(fold, 1, options=options)
+    assert isinstance(start, Point)
+    return [
+        start,
+        *(one for one in traced_curve(Continuation([start], (), options)) if isinstance(one, Point | Special)),
+    ]
+
+
+def timed(work: Callable[[], Made]) -> tuple[Made, float]:
+    """What is made and the better of two processor times, when everything is compiled."""
     made, seconds = work(), []
     for _ in range(2):
         start = time.process_time()
@@ -164,6 +189,11 @@ def main() -> None:
     ((fold, error),) = made.folds
     print(line("Bratu, 20 elements", len(made.points), seconds))
     print(f"    fold {fold:.12f}, estimated error {error:.0e}, error {abs(fold - BRATU_FOLD):.0e}")
+    curve, seconds = timed(partial(fold_curve, chan_fold()))
+    (cusp,) = (one for one in curve if isinstance(one, Special))
+    print(line("fold curve of Chan, 20 elements", len(curve) - 1, seconds))
+    at = np.array([own_parameter(cusp.point), cusp.point.parameter])
+    print(f"    cusp {at}, estimated errors {np.array(cusp.errors)}, errors {np.abs(at - CHAN_CUSP)}")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,10 @@
 """Curves of scenarios in two keys: closed forms, special points, reloading, resuming, starts from them, bad input."""
 
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -171,3 +175,55 @@ def test_foreign_and_other_stores_are_refused(sphere: Path, store: Path, tmp_pat
     (tmp_path / "thesis.tex").write_text("precious")
     with pytest.raises(StoreError, match="holds other files"):
         polarizing(sphere, out=tmp_path)
+
+
+@pytest.mark.slow
+def test_killed_and_resumed_gives_the_same_points(sphere: Path, store: Path, tmp_path: Path):
+    path = tmp_path / "killed"
+    words = "--vary saturation_concentration --start 0.6 --stop 3 --at 2 --resume"
+    command = [sys.executable, "-m", "shapespace", "curve", f"{sphere}:pitchfork-1", *words.split(), "--out", str(path)]
+    for count in (3, 9):
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        deadline = time.monotonic() + 240.0
+        while len(list(path.glob("points/*.npz"))) < count and process.poll() is None:
+            assert time.monotonic() < deadline, "the curve stored nothing"
+            time.sleep(0.002)
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    whole, resumed = ss.open_curve(store), polarizing(sphere, out=path, resume=True)
+    for one, other in zip(resumed.points, whole.points, strict=True):
+        assert_same(one, other)
+
+
+@pytest.fixture(scope="module")
+def division(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Guided division at Pe = 450 (Fig. 7b) past both of its folds."""
+    path = tmp_path_factory.mktemp("division") / "branch"
+    found = ss.branch(ss.scenario("guided-division"), "ring_amplitude", 4.2, start=0.0, out=path, stability=False)
+    assert found["fold-1"].parameter == pytest.approx(2.36247419, abs=1e-6)
+    assert found["fold-2"].parameter == pytest.approx(1.29348538, abs=1e-6)
+    return path
+
+
+@pytest.mark.slow
+def test_the_folds_and_the_pitchforks_of_division_merge_in_one_point(division: Path):
+    """Located on both curves, by different equations, it is the same within the errors given."""
+    folds = ss.curve(f"{division}:fold-1", "peclet", 650.0)["fold-pitchfork-1"]
+    forks = ss.curve(f"{division}:pitchfork-1", "peclet", 650.0)["fold-pitchfork-1"]
+    errors = folds.parameter_errors + forks.parameter_errors
+    assert (np.abs(folds.parameters - forks.parameters) <= errors).all()
+    assert (errors < 1e-6 * np.array([1.0, 620.0])).all()
+
+
+@pytest.mark.slow
+def test_the_second_fold_of_division_ends_in_a_cusp(division: Path, tmp_path: Path):
+    """On both meshes at one place within the errors; towards it the folds of one branch close up as (Pe* - Pe)^(3/2)."""
+    cusps = []
+    for elements in (60, 90):
+        case = ss.scenario("guided-division", elements=elements)
+        path = tmp_path / str(elements)
+        ss.branch(case, "ring_amplitude", 1.2, start=1.4, origin=f"{division}:fold-2", out=path, stability=False)
+        cusps.append(ss.curve(f"{path}:fold-1", "peclet", 2000.0)["cusp-1"])
+    errors = cusps[0].parameter_errors + cusps[1].parameter_errors
+    assert (np.abs(cusps[0].parameters - cusps[1].parameters) <= errors).all()
+    assert (errors < 1e-5 * np.array([1.0, 1950.0])).all()
