@@ -199,7 +199,8 @@ def test_killed_and_resumed_gives_the_same_points(sphere: Path, store: Path, tmp
 def division(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Guided division at Pe = 450 (Fig. 7b) past both of its folds."""
     path = tmp_path_factory.mktemp("division") / "branch"
-    found = ss.branch(ss.scenario("guided-division"), "ring_amplitude", 4.2, start=0.0, out=path, stability=False)
+    case = ss.scenario("guided-division")
+    found = ss.branch(case, "ring_amplitude", 4.2, start=0.0, at=(1.4,), out=path, stability=False)
     assert found["fold-1"].parameter == pytest.approx(2.36247419, abs=1e-6)
     assert found["fold-2"].parameter == pytest.approx(1.29348538, abs=1e-6)
     return path
@@ -217,12 +218,12 @@ def test_the_folds_and_the_pitchforks_of_division_merge_in_one_point(division: P
 
 @pytest.mark.slow
 def test_the_second_fold_of_division_ends_in_a_cusp(division: Path, tmp_path: Path):
-    """On both meshes at one place within the errors; towards it the folds of one branch close up as (Pe* - Pe)^(3/2)."""
+    """On both meshes at one place within the errors."""
     cusps = []
     for elements in (60, 90):
         case = ss.scenario("guided-division", elements=elements)
         path = tmp_path / str(elements)
-        ss.branch(case, "ring_amplitude", 1.2, start=1.4, origin=f"{division}:fold-2", out=path, stability=False)
+        ss.branch(case, "ring_amplitude", 1.2, start=1.4, origin=f"{division}:user-2", out=path, stability=False)
         cusps.append(ss.curve(f"{path}:fold-1", "peclet", 2000.0)["cusp-1"])
     errors = cusps[0].parameter_errors + cusps[1].parameter_errors
     assert (np.abs(cusps[0].parameters - cusps[1].parameters) <= errors).all()
