@@ -220,7 +220,7 @@ def test_the_folds_and_the_pitchforks_of_division_merge_in_one_point(division: P
 def test_the_second_fold_of_division_ends_in_a_cusp(division: Path, tmp_path: Path):
     """On both meshes at one place within the errors."""
     cusps = []
-    for elements in (60, 90):
+    for elements in (40, 80):
         case = ss.scenario("guided-division", elements=elements)
         path = tmp_path / str(elements)
         ss.branch(case, "ring_amplitude", 1.2, start=1.4, origin=f"{division}:user-2", out=path, stability=False)
