@@ -169,6 +169,10 @@ def _request(known: Start, key: str, stop: float, start: float | None, at: Seque
         raise InputError(
             f"{known.text}: is no fold or branch point; give STORE:LABEL of one (labels: {', '.join(KINDS)})."
         )
+    if known.key not in known.keys:
+        raise InputError(
+            f"{known.text}: is of a branch in {known.key}, an observable; start from one in {known.keys[0]}."
+        )
     if key in (known.key, MODELS[known.scenario.model].rival_of(known.key)):
         raise InputError(f"--vary {key}: varies along the branch already; choose another key.")
     KeyedProblem.of(known.scenario, (known.key, key))  # an InputError where the key cannot vary
