@@ -37,7 +37,7 @@ def run(out: Path, quick: bool) -> list[Row]:
     branch = gibbs_loop(out / "gibbs", stability=not quick)
     case = branch.scenario.with_overrides({KEY: SHOWN, "until": 50.0, "time_tolerance": 1e-5})
     low, _, high = three_states(branch)
-    starts = {"without neck": pulled_out(case, branch, WITHOUT), "with neck": necked(branch, WITH)}
+    starts = {"without neck": pulled_out(case, branch, low.label, WITHOUT), "with neck": necked(branch, WITH)}
     runs = {name: ss.run(case, start=start) for name, start in starts.items()}
     rows = []
     for (name, found), target, height in zip(runs.items(), (low, high), (WITHOUT, WITH), strict=True):
@@ -70,9 +70,9 @@ def run(out: Path, quick: bool) -> list[Row]:
     return rows
 
 
-def pulled_out(case: ss.Scenario, branch: ss.Branch, height: float) -> Start:
-    """The state without neck at this scenario, pulled until it is this high; the second run ends at that moment."""
-    start = f"{branch.store}:{three_states(branch)[0].label}"
+def pulled_out(case: ss.Scenario, branch: ss.Branch, label: str, height: float) -> Start:
+    """A labelled state, pulled at this scenario until it is this high; the second run ends at that moment."""
+    start = f"{branch.store}:{label}"
     pulled = case.with_overrides({"pulling_force": PULL, "until": 1.0})
     data = ss.run(pulled, start=start).dataset
     assert float(data["height"][-1]) > height
