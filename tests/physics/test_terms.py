@@ -17,11 +17,11 @@ from shapespace.geometry.parameterization import lagrangian_rates
 from shapespace.physics.activity import ActiveTension
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.force import AxialForce, Pressure
-from shapespace.physics.friction import TangentialFriction
+from shapespace.physics.friction import NormalFriction, TangentialFriction
 from shapespace.physics.onsager import reaction_power, reduced_power, stationary_reaction_rate
 from shapespace.physics.patch import SmoothPatch, Uniform, patch_integral
 from shapespace.physics.species import Ring, Species
-from shapespace.physics.tension import Incompressibility, IsotropicTension
+from shapespace.physics.tension import FixedArea, Incompressibility, IsotropicTension
 from shapespace.physics.term import AbstractEnergy, AbstractTerm, Ledger, Site, energy_power
 from shapespace.physics.viscosity import BulkViscosity, ShearViscosity
 from shapespace.variational.rayleighian import booked_power, density
@@ -36,11 +36,12 @@ PATCH = SmoothPatch(1.7, 0.6, 2.0)
 BENDING = {"uniform": HelfrichBending(1.3, Uniform(0.8)), "coated": HelfrichBending(1.3, PATCH)}
 ENERGIES: dict[str, AbstractEnergy] = {**BENDING, "tension": IsotropicTension(0.9)}
 VISCOUS: dict[str, AbstractTerm] = {"shear": ShearViscosity(0.7), "bulk": BulkViscosity(1.1)}
-DISSIPATIVE = {**VISCOUS, "friction": TangentialFriction(0.6, 0.0)}
+DISSIPATIVE = {**VISCOUS, "friction": TangentialFriction(0.6, 0.0), "normal friction": NormalFriction(0.8)}
 LINEAR: dict[str, AbstractTerm] = {
     **ENERGIES,
     "activity": ActiveTension(5.0, 0.4),
     "incompressibility": Incompressibility(-0.3),
+    "area": FixedArea(-0.7),
     "force": AxialForce(PATCH),
     "pressure": Pressure(2.0),
 }
@@ -113,7 +114,8 @@ def test_bending_energy_of_a_sphere(radius: float, rigidity: float, curvature: f
 def test_tensions_on_a_growing_sphere(radius: float, tension: float, speed: float):
     """Tension times 8 pi R dR/dt; the active one is half its amplitude at the saturation concentration, (stresssc)."""
     expected = tension * 8 * np.pi * radius * speed
-    for term in (IsotropicTension(tension), Incompressibility(tension), ActiveTension(2 * tension, 1.4)):
+    terms = (IsotropicTension(tension), Incompressibility(tension), FixedArea(tension), ActiveTension(2 * tension, 1.4))
+    for term in terms:
         assert_allclose(total(term.power(growing(radius, speed, 1.4))), expected, rtol=1e-12, atol=1e-12)
     assert_allclose(total(IsotropicTension(tension).density(sphere(radius)) * area_element(sphere(radius))),
                     tension * 4 * np.pi * radius**2, rtol=1e-12, atol=1e-12)  # fmt: skip
@@ -136,10 +138,12 @@ def test_pressure_that_balances_a_sphere(radius: float, pressure: float, tension
 def test_dissipation_on_a_sphere(radius: float, viscosity: float, speed: float):
     """Half the dissipation of growth, of a flow from pole to pole (div v = 2 V cos(theta)/R, no shear), of a twist."""
     shear, bulk, slip = ShearViscosity(viscosity), BulkViscosity(viscosity), TangentialFriction(viscosity, 0.0)
+    drag = NormalFriction(viscosity)
     unit = np.pi * viscosity * speed**2
     expected: list[tuple[Callable[[float, float], Site], AbstractTerm, float]] = [
         (growing, bulk, 8.0), (growing, shear, 0.0), (growing, slip, 0.0),
         (flowing, bulk, 8 / 3), (flowing, shear, 0.0), (flowing, slip, 4 / 3 * radius**2),
+        (growing, drag, 2.0 * radius**2), (flowing, drag, 0.0), (twisting, drag, 0.0),
         (twisting, bulk, 0.0), (twisting, shear, 16 / 15), (twisting, slip, 4 / 15 * radius**2),
     ]  # fmt: skip
     for motion, term, factor in expected:

@@ -16,7 +16,7 @@ from shapespace.study.run import Run, run
 from shapespace.study.scenario import scenario
 from shapespace.study.store import RunStore
 
-NAMES = ("guided-division", "polar-swimmer", "membrane-protrusion")
+NAMES = ("guided-division", "polar-swimmer", "membrane-protrusion", "vesicle")
 # A rate of change needs two states, and the flow of the flat disc has no limit at t = 0.
 UNKNOWN_AT_START = {key: {"energy_residual"} for key in NAMES} | {
     "membrane-protrusion": {"energy_residual", "dissipation", "external_power"}

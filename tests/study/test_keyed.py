@@ -18,6 +18,7 @@ from shapespace.study.scenario import scenario
         ("guided-division", ("bending_rigidity", "diffusivity")),
         ("guided-division", ("ring_amplitude", "peclet")),
         ("membrane-protrusion", ("base_radius",)),
+        ("vesicle", ("area_radius", "spontaneous_curvature")),
         ("membrane-protrusion", ("pulling_force", "spontaneous_curvature")),
     ],
 )
@@ -45,6 +46,14 @@ def test_keys_may_vanish_or_be_negative(key: str):
         exact = Engine.of(scenario("membrane-protrusion", **{key: value})).p
         np.testing.assert_allclose(powers.value(np.array([value])), exact, rtol=1e-12)
         np.testing.assert_array_equal(powers.slope(np.array([value]), np.ones(1)) != 0.0, powers.exponents[:, 0] == 1.0)
+
+
+def test_keys_with_bounds():
+    """A reduced volume, less than one, moves the enclosed volume alone."""
+    powers = make_powers(scenario("vesicle"), ("reduced_volume",))
+    exact = Engine.of(scenario("vesicle", reduced_volume=0.9)).p
+    np.testing.assert_allclose(powers.value(np.array([0.9])), exact, rtol=1e-14)
+    assert np.count_nonzero(powers.exponents) == 1
 
 
 def test_other_keys_are_refused():

@@ -77,7 +77,7 @@ def test_guided_division_has_the_values_of_the_paper():
 
 
 def test_other_scenarios_have_the_values_of_the_paper():
-    slipping, swimmer, membrane = (scenario(name).values() for name in NAMES[1:])
+    slipping, swimmer, membrane = (scenario(name).values() for name in NAMES[1:4])
     assert (slipping["turnover_rate"], slipping["saturation_concentration"], slipping["ring_amplitude"]) == (9, 1, 0)
     assert (slipping["initial_background"], slipping["initial_ring_amplitude"]) == (0.2, 2)
     assert slipping["seed_amplitude"] != 0

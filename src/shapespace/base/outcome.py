@@ -73,9 +73,7 @@ _ADVICE = {
     Outcome.NOT_REACHED: (
         "Stepping stalled on the way to these parameters: there may be no such state, or a fold lies between; follow the branch."
     ),
-    Outcome.NO_STATE: (
-        "No state of this name was found at these parameters: choose others, or another --state (trivial is everywhere)."
-    ),
+    Outcome.NO_STATE: ("No state of this name was found at these parameters: choose others, or another --state."),
     Outcome.BRANCH_STALLED: (
         "The step along the branch fell below its minimum: the branch may end here; if not, refine the mesh or loosen tolerances."
     ),

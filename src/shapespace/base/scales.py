@@ -5,6 +5,7 @@ The solver only ever sees numbers in units of four scales (c0 = reference_concen
                    length               energy                     time                               concentration
     closed surface R0 = sphere_radius   kappa = bending_rigidity   tau = bulk_viscosity R0^2/kappa    c0
     open membrane  R_b = base_radius    kappa = bending_rigidity   tau = shear_viscosity R_b^2/kappa  none
+    vesicle        R_A = area_radius    kappa = bending_rigidity   tau = bulk_viscosity R_A^2/kappa   none
 
 so two statements of one experiment in different units are the same computation, to round-off.
 """
@@ -60,7 +61,8 @@ QUANTITIES: dict[str, Quantity] = {
     "shear_viscosity": Quantity("eta_s", "surface shear viscosity", _VISCOSITY),
     "bulk_viscosity": Quantity("eta_b", "surface bulk viscosity", _VISCOSITY),
     "friction": Quantity("Gamma", "tangential friction with the surroundings", Dimension(-4, 1, 1)),
-    "tension": Quantity("gamma", "passive isotropic tension", _TENSION),
+    "normal_friction": Quantity("Gamma_n", "friction with the surroundings along the normal", Dimension(-4, 1, 1)),
+    "tension": Quantity("gamma", "isotropic tension, given or holding the area", _TENSION),
     "boundary_tension": Quantity("gamma0", "tension of the reservoir at the rim", _TENSION),
     "active_tension": Quantity("(xi Delta_mu)_0", "active tension at saturation", _TENSION),
     "peclet": Quantity("Pe", "Peclet number (xi Delta_mu)_0 R0^2 / (D eta_b)", _NUMBER),
@@ -75,6 +77,7 @@ QUANTITIES: dict[str, Quantity] = {
     "ring_width": Quantity("w", "width of the ring in u", _NUMBER),
     "sphere_radius": Quantity("R0", "radius of the sphere of the enclosed volume", _LENGTH),
     "enclosed_volume": Quantity("V0", "enclosed volume", Dimension(3)),
+    "area_radius": Quantity("R_A", "radius of the sphere of the same area", _LENGTH),
     "base_radius": Quantity("R_b", "radius of the clamped rim", _LENGTH),
     "coat_area": Quantity("A_p", "area of the coat per 2 pi", _AREA),
     "coat_sharpness": Quantity("sigma_p", "sharpness of the coat's edge per 2 pi", Dimension(-2)),
@@ -83,6 +86,8 @@ QUANTITIES: dict[str, Quantity] = {
     "initial_background": Quantity("c_b", "initial uniform concentration over c0", _NUMBER),
     "initial_ring_amplitude": Quantity("c_r", "initial ring concentration over c0", _NUMBER),
     "seed_amplitude": Quantity("epsilon", "relative antisymmetric perturbation of the initial concentration", _NUMBER),
+    "initial_oblate": Quantity("oblate", "switch that makes the initial spheroid a flat one", _NUMBER),
+    "initial_leaning": Quantity("e", "antisymmetric part of the initial shape", _NUMBER),
     "until": Quantity("t_end", "end time", _TIME),
     "dt": Quantity("Delta_t", "fixed time step, 0 for adaptive steps", _TIME),
     "time_tolerance": Quantity("tol_t", "relative local error of one adaptive step", _NUMBER),
@@ -131,6 +136,9 @@ QUANTITIES: dict[str, Quantity] = {
 }
 
 
+_RADII = {"sphere_radius": "R0", "base_radius": "R_b", "area_radius": "R_A"}
+
+
 @dataclass(frozen=True)
 class Scales:
     """The four scales of one scenario, in the user's units. All finite and > 0.
@@ -156,17 +164,17 @@ class Scales:
 
     @classmethod
     def of(cls, parameters: Mapping[str, float]) -> Self:
-        """The scales of a set of parameters, of the open membrane where it has a `base_radius`."""
-        is_open = "base_radius" in parameters
-        length = parameters["base_radius" if is_open else "sphere_radius"]
-        viscosity = parameters["shear_viscosity" if is_open else "bulk_viscosity"]
+        """The scales of a set of parameters, of the model to which its radius belongs."""
+        radius, symbol = next((name, symbol) for name, symbol in _RADII.items() if name in parameters)
+        length = parameters[radius]
+        viscosity = parameters["shear_viscosity" if radius == "base_radius" else "bulk_viscosity"]
         energy = parameters["bending_rigidity"]
         return cls(
             length=length,
             energy=energy,
             time=viscosity * length / energy * length,
-            concentration=1.0 if is_open else parameters["reference_concentration"],
-            length_symbol="R_b" if is_open else "R0",
+            concentration=parameters.get("reference_concentration", 1.0),
+            length_symbol=symbol,
         )
 
     def factor(self, name: str) -> float:

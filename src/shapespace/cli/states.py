@@ -44,7 +44,10 @@ def steady_command(
     start: StartFrom = None,
     state: Annotated[
         str | None,
-        Parameter(metavar="NAME", help="default, or trivial: the resting sphere or the flat disc."),
+        Parameter(
+            metavar="NAME",
+            help="default; trivial: resting sphere or flat disc; prolate, oblate, stomatocyte: vesicles.",
+        ),
     ] = None,
     out: Annotated[Path | None, Parameter(metavar="DIR", help="New directory to store the state in.")] = None,
     as_json: AsJson = False,

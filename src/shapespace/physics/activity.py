@@ -3,8 +3,7 @@
 from typing import ClassVar
 
 from shapespace.base.arrays import Traced
-from shapespace.geometry.curve import area_element
-from shapespace.geometry.motion import divergence
+from shapespace.physics.tension import tension_power
 from shapespace.physics.term import AbstractTerm, Ledger, Site
 
 
@@ -25,5 +24,4 @@ class ActiveTension(AbstractTerm):
 
     def power(self, site: Site) -> Traced:
         """xi Delta mu(c) div(v) r h."""
-        dilation = divergence(site.geometry, site.rates, site.gradients)
-        return self.tension(site.concentration) * dilation * area_element(site.geometry)
+        return tension_power(self.tension(site.concentration), site)

@@ -1,4 +1,4 @@
-"""Isotropic tension: passive, active, or the multiplier of incompressibility."""
+"""Isotropic tension: passive, or the multiplier of a constraint on area, local or total."""
 
 from typing import ClassVar
 
@@ -6,6 +6,11 @@ from shapespace.base.arrays import Traced
 from shapespace.geometry.curve import Geometry, area_element
 from shapespace.geometry.motion import divergence
 from shapespace.physics.term import AbstractEnergy, AbstractTerm, Ledger, Site
+
+
+def tension_power(tension: Traced, site: Site) -> Traced:
+    """gamma div(v) r h of an isotropic tension gamma [energy/length^2]."""
+    return tension * divergence(site.geometry, site.rates, site.gradients) * area_element(site.geometry)
 
 
 class IsotropicTension(AbstractEnergy):
@@ -25,7 +30,7 @@ class IsotropicTension(AbstractEnergy):
 
     def power(self, site: Site) -> Traced:
         """gamma div(v) r h."""
-        return self.tension * divergence(site.geometry, site.rates, site.gradients) * area_element(site.geometry)
+        return tension_power(self.tension, site)
 
 
 class Incompressibility(AbstractTerm):
@@ -36,4 +41,19 @@ class Incompressibility(AbstractTerm):
 
     def power(self, site: Site) -> Traced:
         """gamma_H div(v) r h."""
-        return self.tension * divergence(site.geometry, site.rates, site.gradients) * area_element(site.geometry)
+        return tension_power(self.tension, site)
+
+
+class FixedArea(AbstractTerm):
+    """Power Sigma div(v) of a tension Sigma, one number, the multiplier of the total area: dA/dt = int div(v) dA.
+
+    The area may flow along the surface. At rest nothing distinguishes it from a surface that is incompressible everywhere.
+    Sphere: p = 2 Sigma/R + kappa C0 (C0 R - 2)/R^2, with Sigma undetermined, as no other shape has its area and volume.
+    """
+
+    ledger: ClassVar[Ledger] = Ledger.CONSTRAINT
+    tension: Traced
+
+    def power(self, site: Site) -> Traced:
+        """Sigma div(v) r h."""
+        return tension_power(self.tension, site)

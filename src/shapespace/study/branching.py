@@ -22,10 +22,11 @@ from shapespace.study.engine import Engine, state_of
 from shapespace.study.keyed import HeldProblem, KeyedProblem
 from shapespace.study.landmarks import Surveyor, physical_end
 from shapespace.study.measures import make_observable
+from shapespace.study.paths import MAX_POINTS, StateName, state_names
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import Start, find_start
-from shapespace.study.steady import MAX_POINTS, StateName, Steady, key_values, steady, steady_near
+from shapespace.study.steady import Steady, key_values, steady, steady_near
 
 FIRST_STEP = 0.02
 ENDS = (Outcome.REACHED_STOP, Outcome.NECK_CLOSED, Outcome.SELF_CONTACT, Outcome.SELF_INTERSECTING)
@@ -307,7 +308,7 @@ def _named(scenario: Scenario, state: str | None) -> tuple[str, Steady]:
     """The state of this name; without a name the default one where there is one, else the trivial one. With its name."""
     name = state or StateName.DEFAULT
     found = steady(scenario, state=name)
-    if state is None and not found.outcome.is_success:
+    if state is None and not found.outcome.is_success and StateName.TRIVIAL in state_names(scenario.model):
         name = StateName.TRIVIAL
         found = steady(scenario, state=name)
     return str(name), found

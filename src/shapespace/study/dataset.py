@@ -37,8 +37,8 @@ def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome |
     times = np.array([frame.time for frame in frames])
     fields = [_fields(engine, frame) for frame in frames]
     series = [frame.observables for frame in frames]
-    if frames[0].step == 0.0 and scenario.model == "closed-surface":
-        fields[0], series[0] = _set_in_motion(fields, series)
+    if frames[0].step == 0.0 and "p" in engine.system.scalars:
+        fields[0], series[0] = _set_in_motion(fields, series, _flow_observables(engine))
     if "velocity" in series[-1]:
         travelled = _travelled(times, np.array([values.get("velocity", 0.0) for values in series]))
         travelled = travelled / scales.factor("length")
@@ -81,7 +81,7 @@ def open_dataset(path: str | Path) -> xr.Dataset:
 
 
 def _set_in_motion(
-    fields: list[dict[str, Array]], series: list[dict[str, float]]
+    fields: list[dict[str, Array]], series: list[dict[str, float]], solved_for: tuple[str, ...]
 ) -> tuple[dict[str, Array], dict[str, float]]:
     """Fields and observables of the initial frame with what its force balance gives: to the length of the first step,
     the values after it. Where no step was taken they are not known, NaN and absent.
@@ -92,9 +92,14 @@ def _set_in_motion(
         name: np.interp(u, later[0]["mesh_coordinate"], later[0][name]) if later else np.full_like(u, np.nan)
         for name in _FLOW_FIELDS
     }
-    given = {name: value for name, value in series[0].items() if name not in _FLOW_OBSERVABLES}
-    solved = {name: after[0][name] for name in _FLOW_OBSERVABLES if after and name in after[0]}
+    given = {name: value for name, value in series[0].items() if name not in solved_for}
+    solved = {name: after[0][name] for name in solved_for if after and name in after[0]}
     return fields[0] | flow, given | solved
+
+
+def _flow_observables(engine: Engine) -> tuple[str, ...]:
+    """Those that belong to the motion, not to the shape: a tension too where it holds the area."""
+    return (*_FLOW_OBSERVABLES, *(("tension", "tension_pole") if "sigma" in engine.system.scalars else ()))
 
 
 def _travelled(times: Array, speeds: Array) -> Array:

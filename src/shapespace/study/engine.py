@@ -5,8 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from shapespace.base.arrays import Array
+from shapespace.geometry.spheroid import Spheroid
 from shapespace.models.closed_surface import make_closed_surface
 from shapespace.models.open_membrane import make_open_membrane
+from shapespace.models.vesicle import make_vesicle
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.mesh import uniform_mesh
@@ -20,7 +22,11 @@ _SYSTEMS = {
     ("closed-surface", True): make_closed_surface(azimuthal=True),
     ("open-membrane", False): make_open_membrane(),
     ("open-membrane", True): make_open_membrane(azimuthal=True),
+    ("vesicle", False): make_vesicle(),
+    ("vesicle", True): make_vesicle(azimuthal=True),
 }
+
+BALL = 4.0 / 3.0 * np.pi
 
 
 @dataclass(frozen=True)
@@ -45,11 +51,15 @@ class Engine:
         system = _SYSTEMS[scenario.model, numerics.azimuthal_flow]
         values = {"rotation_rate": 0.0, **scenario.dimensionless()}
         if scenario.model == "closed-surface":
-            values["enclosed_volume"] = 4.0 / 3.0 * np.pi * values["sphere_radius"] ** 3
+            values["enclosed_volume"] = BALL * values["sphere_radius"] ** 3
+        elif scenario.model == "vesicle":
+            values["enclosed_volume"] = BALL * values["area_radius"] ** 3 * values["reduced_volume"]
+            values["surface_area"] = 4.0 * np.pi * values["area_radius"] ** 2
+            values["initial_oblate"] = float(scenario.values()["initial_oblate"])
         p = np.array([values[name] for name in system.parameters])
         mesh = uniform_mesh(numerics.elements)
-        n_integrals = 1 if scenario.model == "closed-surface" else 0
-        return cls(CollocationProblem(system, mesh, numerics.degree, n_integrals, numerics.mesh_tolerance), p, values)
+        problem = CollocationProblem(system, mesh, numerics.degree, len(system.held), numerics.mesh_tolerance)
+        return cls(problem, p, values)
 
     def placed(self, state: State) -> tuple[CollocationProblem, Array]:
         """The problem on a state's mesh and the state on it, resampled where it has another degree or fewer elements."""
@@ -68,10 +78,10 @@ class Engine:
         return problem, problem.pack(state)
 
     def initial_state(self) -> State:
-        """The sphere or the flat disc at rest, with the initial concentration; multipliers are first guesses."""
+        """The sphere, flat disc or spheroid at rest, with the initial concentration; multipliers are first guesses."""
         rule, mesh = gauss_rule(self.problem.degree), self.problem.mesh
         stages = mesh[:-1, None] + np.diff(mesh)[:, None] * rule.points
-        functions = self._sphere if "p" in self.system.scalars else self._disc
+        functions = (self._disc, self._sphere, self._spheroid)[len(self.system.held)]
         scalars = functions(mesh)[2]
         values = self._columns(functions(mesh)[0])
         slopes = self._columns(functions(stages)[1])
@@ -102,6 +112,26 @@ class Engine:
         c_0 = v["spontaneous_curvature"]
         pressure = 2.0 * tension / radius + v["bending_rigidity"] * c_0 * (c_0 * radius - 2.0) / radius**2
         return fields, slopes, np.array([np.pi * radius, pressure, 0.0])
+
+    def _spheroid(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], Array]:
+        """Fields, their slopes, and (h, p, sigma, v0): a leaning spheroid at rest, multipliers as near a sphere.
+
+        There the volume yields to l = 2 at p = -2 kappa (6 - C0 R)/R^3 (Ou-Yang and Helfrich, Phys. Rev. Lett. 59, 2486
+        (1987)), which sigma = R p/2 - kappa C0 (C0 R - 2)/(2 R) balances.
+        """
+        v, radius = self.values, self.values["area_radius"]
+        leaning = v["initial_leaning"] * np.sqrt(1.0 - v["reduced_volume"])
+        shape = Spheroid.of(v["surface_area"], v["enclosed_volume"], bool(v["initial_oblate"]), leaning)
+        t, h, c_0, kappa = shape.parameter(u), shape.length, v["spontaneous_curvature"], v["bending_rigidity"]
+        (r, z), psi, (meridional, azimuthal) = shape.outline(t), shape.tangent_angle(t), shape.curvatures(t)
+        pressure = -2.0 * kappa * (6.0 - c_0 * radius) / radius**3
+        tension = 0.5 * radius * pressure - 0.5 * kappa * c_0 * (c_0 * radius - 2.0) / radius
+        fields = {"r": r, "z": z, "psi": psi}
+        slopes = {"r": h * np.cos(psi), "z": -h * np.sin(psi), "psi": h * meridional}
+        fields |= {"moment": r * kappa * (meridional + azimuthal - c_0), "meridional_force": tension * r}
+        # A first guess, like the multipliers: that of even curvature.
+        slopes |= {"moment": slopes["r"] * kappa * (2.0 / radius - c_0), "meridional_force": tension * slopes["r"]}
+        return fields, slopes, np.array([h, pressure, tension, 0.0])
 
     def _disc(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], Array]:
         """Fields, their slopes, and (h,) of the flat disc at the reservoir's tension."""

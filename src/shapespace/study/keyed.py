@@ -63,12 +63,13 @@ def make_powers(scenario: Scenario, keys: tuple[str, ...]) -> Powers:
     for key in keys:
         if key not in known:
             raise InputError(f"{key}: is not a parameter of this model; choose one of {', '.join(known)}.")
-    base = _parameters(scenario, keys, np.ones(len(keys)))
-    doubled = [_parameters(scenario, keys, 1.0 + np.eye(len(keys))[k]) for k in range(len(keys))]
-    safe = np.where(base == 0.0, 1.0, base)
-    ratios = np.stack([np.where(base == 0.0, 1.0, p / safe) for p in doubled], axis=1)
+    # At values that every key may have: a reduced volume is less than one.
+    base = _parameters(scenario, keys, np.full(len(keys), 0.5))
+    halved = [_parameters(scenario, keys, 0.5 - 0.25 * np.eye(len(keys))[k]) for k in range(len(keys))]
+    ratios = np.stack([np.where(base == 0.0, 1.0, base / np.where(base == 0.0, 1.0, p)) for p in halved], axis=1)
     # Exponents are multiples of 1/6: of areas, volumes and their roots.
-    return Powers(base, np.round(6.0 * np.log2(ratios)) / 6.0)
+    exponents = np.round(6.0 * np.log2(ratios)) / 6.0
+    return Powers(base * 2.0 ** exponents.sum(axis=1), exponents)
 
 
 def _parameters(scenario: Scenario, keys: tuple[str, ...], values: Array) -> Array:

@@ -23,6 +23,8 @@ from shapespace.study.parameters import (
     OpenMembraneParameters,
     Record,
     RunSettings,
+    VesicleInitial,
+    VesicleParameters,
     complaint,
     shown,
 )
@@ -90,25 +92,14 @@ class Model(NamedTuple):
         return next((name for name, twin in self.twins.items() if twin.sets == key), None)
 
 
+def _model(parameters: type[Record], initial: type[Record], twins: dict[str, Twin]) -> Model:
+    return Model({"parameters": parameters, "initial": initial, "run": RunSettings, "numerics": Numerics}, twins)
+
+
 MODELS = {
-    "closed-surface": Model(
-        {
-            "parameters": ClosedSurfaceParameters,
-            "initial": ClosedSurfaceInitial,
-            "run": RunSettings,
-            "numerics": Numerics,
-        },
-        _CLOSED_TWINS,
-    ),
-    "open-membrane": Model(
-        {
-            "parameters": OpenMembraneParameters,
-            "initial": OpenMembraneInitial,
-            "run": RunSettings,
-            "numerics": Numerics,
-        },
-        {},
-    ),
+    "closed-surface": _model(ClosedSurfaceParameters, ClosedSurfaceInitial, _CLOSED_TWINS),
+    "open-membrane": _model(OpenMembraneParameters, OpenMembraneInitial, {}),
+    "vesicle": _model(VesicleParameters, VesicleInitial, {}),
 }
 
 

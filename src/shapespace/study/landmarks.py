@@ -10,14 +10,12 @@ from shapespace.analysis.branch import Point, metric
 from shapespace.analysis.passage import Hopf, growing_pairs, locate_hopf
 from shapespace.analysis.stability import Disc, Spectrum
 from shapespace.analysis.tracing import Located, Missed, singular_points
-from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.geometry.contact import crosses_itself
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
 from shapespace.study.course import Course
 from shapespace.study.keyed import HeldProblem, KeyedProblem
-from shapespace.study.observables import CLOSING_RADIUS, neck_radius
+from shapespace.study.observables import shape_end
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
 from shapespace.study.steady import Rates, frame_of, observables_at
@@ -26,32 +24,12 @@ HOPF, CHANGE = "hopf", "stability-change"
 """Kinds besides those of singular points: a pair of rates crosses the axis; the count of growing modes is not explained."""
 AT_START = 1e-6
 """A special point on the first step whose key differs less from that of the start, relative to it (or one), is the start."""
-OUTLINE = 6
-"""Segments of an outline per element, to see where it crosses itself."""
 
 
 def physical_end(point: Point) -> Outcome | None:
-    """Why no physical shape lies beyond a point, if so: its neck has closed, or its outline crosses itself."""
+    """Why no physical shape lies beyond a point, if so."""
     assert isinstance(point.problem, KeyedProblem | HeldProblem)
-    base = point.problem.base
-    state, fields = base.unpack(point.problem.surface(point.x)), base.system.fields
-    r = fields.index("r")
-    neck = neck_radius(state, r)
-    if neck is not None and neck < CLOSING_RADIUS:
-        return Outcome.NECK_CLOSED
-    places = np.arange(OUTLINE * base.elements + 1) / OUTLINE
-    u = np.interp(places, np.arange(base.elements + 1), state.mesh)
-    z = fields.index("z")
-
-    def outline(u: Array) -> tuple[Array, Array]:
-        values = state.values(u)
-        return values[:, r], values[:, z]
-
-    radii, heights = outline(u)
-    # An outline that only falls and stays on its side of the axis cannot cross itself.
-    if (np.diff(heights) < 0.0).all() and radii.min() >= 0.0:
-        return None
-    return Outcome.SELF_INTERSECTING if crosses_itself(outline, u) else None
+    return shape_end(point.problem.base, point.problem.surface(point.x))
 
 
 class Surveyor:

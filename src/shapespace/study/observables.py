@@ -3,13 +3,18 @@
 import numpy as np
 
 from shapespace.base.arrays import Array
+from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
+from shapespace.geometry.contact import crosses_itself
+from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine
 from shapespace.variational.ledger import densities
 
 CLOSING_RADIUS = 1e-4
 """A neck thinner than this, in units of the surface's length scale, counts as closed."""
+OUTLINE = 6
+"""Segments of an outline per element, to see where it crosses itself."""
 _SAMPLES_PER_ELEMENT = 4
 _ZOOMS = 5
 """Each narrows the place of an extremum eightfold; its value then is exact to round-off."""
@@ -34,7 +39,9 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
     if radius is not None:
         out["neck_radius"] = radius
     if "p" in scalars:
-        out |= _closed(engine, state, column, integrals, scalars)
+        out |= _closed(state, column, integrals, scalars)
+        out |= _regulated(engine, state, column, integrals) if "c" in column else {}
+        out |= dict.fromkeys(("tension", "tension_pole"), scalars["sigma"]) if "sigma" in scalars else {}
     else:
         # The rim lets matter in at the reservoir's tension, which does work on the membrane.
         out["external_power"] += 2.0 * np.pi * last[column["meridional_force"]] * last[column["v"]]
@@ -45,13 +52,10 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
 
 
 def _closed(
-    engine: Engine, state: State, column: dict[str, int], integrals: dict[str, float], scalars: dict[str, float]
+    state: State, column: dict[str, int], integrals: dict[str, float], scalars: dict[str, float]
 ) -> dict[str, float]:
-    """Observables that only a closed surface with a regulator has."""
-    v = engine.values
-    c_pole = state.nodes[0, column["c"]]
+    """Observables that only a closed surface has."""
     poles = state.derivatives(np.array([0.0, 1.0]))[:, column["psi"]]
-    position, largest = largest_value(state, column["c"])
     area, volume = integrals["area"], integrals["volume"]
     return {
         "volume": volume,
@@ -59,6 +63,15 @@ def _closed(
         "pressure": scalars["p"],
         "velocity": scalars["v0"],
         "polarity": 1.0 - poles[0] / poles[1],
+    }
+
+
+def _regulated(engine: Engine, state: State, column: dict[str, int], integrals: dict[str, float]) -> dict[str, float]:
+    """Observables that only a surface with a regulator has."""
+    v = engine.values
+    c_pole = state.nodes[0, column["c"]]
+    position, largest = largest_value(state, column["c"])
+    return {
         "tension_pole": v["tension"]
         + v["active_tension"] * c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2),
         "max_concentration": largest,
@@ -87,6 +100,28 @@ def neck(state: State, r: int) -> tuple[float, float] | None:
     inner = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1
     found = [_largest_between(state, r, -1.0, u[i - 1], u[i + 1]) for i in inner]
     return min(((place, -value) for place, value in found), key=lambda one: one[1], default=None)
+
+
+def shape_end(problem: CollocationProblem, x: Array) -> Outcome | None:
+    """Why no physical shape lies beyond a state, if so: its neck has closed, or its outline crosses itself."""
+    state, fields = problem.unpack(x), problem.system.fields
+    r = fields.index("r")
+    neck = neck_radius(state, r)
+    if neck is not None and neck < CLOSING_RADIUS:
+        return Outcome.NECK_CLOSED
+    places = np.arange(OUTLINE * problem.elements + 1) / OUTLINE
+    u = np.interp(places, np.arange(problem.elements + 1), state.mesh)
+    z = fields.index("z")
+
+    def outline(u: Array) -> tuple[Array, Array]:
+        values = state.values(u)
+        return values[:, r], values[:, z]
+
+    radii, heights = outline(u)
+    # An outline that only falls and stays on its side of the axis cannot cross itself.
+    if (np.diff(heights) < 0.0).all() and radii.min() >= 0.0:
+        return None
+    return Outcome.SELF_INTERSECTING if crosses_itself(outline, u) else None
 
 
 def largest_value(state: State, field: int) -> tuple[float, float]:

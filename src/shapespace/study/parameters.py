@@ -68,6 +68,19 @@ class OpenMembraneParameters(Record):
     base_radius: Positive
 
 
+class VesicleParameters(Record):
+    """Material constants of a membrane of fixed area around a fixed volume, in the user's units."""
+
+    bending_rigidity: Positive
+    spontaneous_curvature: float = 0.0
+    shear_viscosity: Positive
+    bulk_viscosity: Positive
+    friction: NonNegative
+    normal_friction: NonNegative
+    reduced_volume: Annotated[float, Field(gt=0, lt=1)]
+    area_radius: Positive
+
+
 class ClosedSurfaceInitial(Record):
     """c(u, 0) = c0 (initial_background + initial_ring_amplitude exp(-(u-1/2)^2/w^2)) (1 + seed_amplitude cos(pi u))."""
 
@@ -87,6 +100,13 @@ class ClosedSurfaceInitial(Record):
 
 class OpenMembraneInitial(Record):
     """The membrane starts as a flat disc: nothing to choose."""
+
+
+class VesicleInitial(Record):
+    """r = a sin t (1 + e cos t), z = c cos t, long or flat, with e = initial_leaning sqrt(1 - reduced_volume)."""
+
+    initial_oblate: bool = False
+    initial_leaning: Annotated[float, Field(gt=-1, lt=1)] = 0.0
 
 
 class RunSettings(Record):

@@ -24,7 +24,7 @@ Progress = Callable[[Frame, int], None]
 HISTORY = 4
 
 # Ends that a resumed run keeps, since nothing more would happen.
-_FINAL = {Outcome.STATIONARY, Outcome.NECK_CLOSED}
+_FINAL = {Outcome.STATIONARY, Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING}
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,8 @@ from shapespace.study.parameters import (
     OpenMembraneParameters,
     Record,
     RunSettings,
+    VesicleInitial,
+    VesicleParameters,
     complaint,
     shown,
 )
@@ -31,7 +33,7 @@ from shapespace.study.parameters import (
 # What a resumed run may change: how far it goes, not what it computes.
 FREE_ON_RESUME = ("until", "max_steps")
 
-_NAMES = ("guided-division", "ring-slipping", "polar-swimmer", "membrane-protrusion")
+_NAMES = ("guided-division", "ring-slipping", "polar-swimmer", "membrane-protrusion", "vesicle")
 _SECTIONS = ("parameters", "initial", "run", "numerics")
 
 
@@ -44,8 +46,8 @@ class Scenario(Record):
 
     name: str
     model: str
-    parameters: ClosedSurfaceParameters | OpenMembraneParameters
-    initial: ClosedSurfaceInitial | OpenMembraneInitial
+    parameters: ClosedSurfaceParameters | OpenMembraneParameters | VesicleParameters
+    initial: ClosedSurfaceInitial | OpenMembraneInitial | VesicleInitial
     run: RunSettings
     numerics: Numerics
     given: tuple[tuple[str, Value], ...]

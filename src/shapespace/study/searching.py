@@ -16,15 +16,14 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.landmarks import physical_end
+from shapespace.study.paths import NEWTON, own_states
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import Search, SearchStore, Tried
 from shapespace.study.spectra import spectrum_at
 from shapespace.study.starts import Start, find_starts
 from shapespace.study.steady import (
-    NEWTON,
     Rates,
-    StateName,
     check_has_isolated_states,
     frame_of,
     key_values,
@@ -35,7 +34,7 @@ from shapespace.study.steady import (
 )
 
 MAX_TRIES = 200
-DRIVING = ("ring_amplitude", "peclet", "spontaneous_curvature", "pulling_force")
+DRIVING = ("reduced_volume", "ring_amplitude", "peclet", "spontaneous_curvature", "pulling_force")
 """Keys that drive a surface away from its resting shape; the first that does is varied to get neighbouring states."""
 NEIGHBOURS = (0.9, 1.1)
 """Factors of that key."""
@@ -56,7 +55,7 @@ def search_states(
 ) -> Search:
     """Search for all stationary states of a scenario at its parameters; mirror images count as one state.
 
-    Starts: the resting sphere or the flat disc; the scenario's named state; stored states `origins` (`STORE` or
+    Starts: the resting sphere or the flat disc; the scenario's named states; stored states `origins` (`STORE` or
     `STORE:LABEL`; of a branch without a label all labelled points and those next to the scenario's value of its key); each
     state found, perturbed by its leading modes, and as it is at neighbouring values of a key. All that was found is deflated.
     `out` is the directory of the store, new or empty; with `resume` a store there is continued, to the same tries as if it had
@@ -126,10 +125,11 @@ class _Searcher:
         self._spectra: dict[int, Spectrum] = {}
 
     def guesses(self) -> Iterator[Guess]:
-        """The resting shape in closed form, and the scenario's own state."""
+        """The resting shape in closed form, and the scenario's own states."""
         yield self._guess("reference", Engine.of(reference(self.scenario)).initial_state())
-        found = steady(self.scenario, state=StateName.DEFAULT)
-        yield self._guess("state default", found.problem.base.unpack(found.found.x))
+        for name in own_states(self.scenario.model):
+            found = steady(self.scenario, state=name)
+            yield self._guess(f"state {name}", found.problem.base.unpack(found.found.x))
 
     def guess_from(self, start: Start) -> Guess:
         """What a stored state becomes at the scenario's parameters; where it becomes nothing, the stored state itself."""

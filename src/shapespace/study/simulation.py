@@ -12,7 +12,7 @@ from shapespace.base.problem import Rate
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
-from shapespace.study.observables import CLOSING_RADIUS, measure, neck_radius
+from shapespace.study.observables import measure, shape_end
 from shapespace.study.scenario import Scenario
 
 ORDER = 3
@@ -54,15 +54,10 @@ class Simulation:
             stationary_rate=run["stationary_rate"],
             max_steps=self.scenario.run.max_steps,
         )
-        evolution = Evolution(past, engine.p, run["until"], stepping, events=(self._neck_event,))
+        evolution = Evolution(past, engine.p, run["until"], stepping, events=(_shape_event,))
         for moment in evolution:
             yield self._frame(moment)
         self.outcome = evolution.outcome or Outcome.REACHED_END
-
-    def _neck_event(self, moment: Moment) -> Outcome | None:
-        assert isinstance(moment.problem, CollocationProblem)
-        neck = neck_radius(moment.problem.unpack(moment.x), self._engine.system.fields.index("r"))
-        return Outcome.NECK_CLOSED if neck is not None and neck < CLOSING_RADIUS else None
 
     def _moment(self, frame: Frame) -> Moment:
         """The moment of a stored frame."""
@@ -106,3 +101,9 @@ class Simulation:
         change = float(derivative_weights(times) @ energies)
         supply = values["external_power"] + values.get("chemical_power", 0.0)
         return {"energy_residual": change + values["dissipation"] - supply}
+
+
+def _shape_event(moment: Moment) -> Outcome | None:
+    """Where no physical shape lies beyond."""
+    assert isinstance(moment.problem, CollocationProblem)
+    return shape_end(moment.problem, moment.x)

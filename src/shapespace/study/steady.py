@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from enum import StrEnum
 from pathlib import Path
 from typing import Self
 
@@ -10,8 +9,7 @@ import numpy as np
 
 from shapespace.analysis.bifurcation import Kind, solve_singular
 from shapespace.analysis.branch import Point
-from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
-from shapespace.analysis.extended import Parameter
+from shapespace.analysis.continuation import Arclength, Continuation, start_point
 from shapespace.analysis.stability import Spectrum
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.analysis.tracing import Located, side_branches, traced
@@ -20,27 +18,20 @@ from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.numerics.collocation import CollocationProblem
-from shapespace.numerics.newton import Newton
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.modes import Modes
-from shapespace.study.observables import measure
+from shapespace.study.observables import measure, shape_end
+from shapespace.study.paths import MAX_POINTS, NEWTON, StateName, along, read_state_name, steps
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
 from shapespace.study.starts import Start, find_start
+from shapespace.study.vesicles import solve_vesicle
 
-NEWTON = Newton(tolerance=1e-10)
-MAX_POINTS = 400
-"""Of the way from the reference to a scenario's parameters."""
-
-
-class StateName(StrEnum):
-    """Which stationary state of a scenario: the one it is named for, or the resting one."""
-
-    DEFAULT = "default"
-    TRIVIAL = "trivial"
+MAIN_KEYS = {"closed-surface": "peclet", "open-membrane": "spontaneous_curvature", "vesicle": "reduced_volume"}
+"""By model, the key of a problem that need not vary any."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +76,10 @@ class Steady:
 
     @property
     def outcome(self) -> Outcome:
-        """How the search ended."""
-        return self.found.outcome
+        """How the search ended; a state that solves the equations may be the shape of no surface."""
+        if self.found.outcome is not Outcome.CONVERGED:
+            return self.found.outcome
+        return shape_end(self.problem.base, self.found.x) or Outcome.CONVERGED
 
     @property
     def engine(self) -> Engine:
@@ -173,10 +166,9 @@ def steady(
 
     start: `STORE` or `STORE:LABEL`, as text or as `find_start` returns it. The result's outcome says whether there is one.
     """
-    if state not in tuple(StateName):
-        raise InputError(f"state = {state}: is unknown; choose one of {', '.join(StateName)}.")
+    name = read_state_name(state, scenario.model)
     if start is None:
-        return solve_steady(scenario, StateName(state))
+        return solve_steady(scenario, name)
     return steady_near(scenario, start if isinstance(start, Start) else find_start(start))
 
 
@@ -224,13 +216,16 @@ def _singular_at(scenario: Scenario, start: Start) -> Steady | None:
 
 
 def solve_steady(scenario: Scenario, name: StateName = StateName.DEFAULT) -> Steady:
-    """The named stationary state of the scenario, from the resting sphere or the flat disc.
+    """The named stationary state of the scenario, from the resting sphere or the flat disc; a vesicle from beside the sphere.
 
     That reference solves the equations without a ring, a coat and a pull; these are then raised one after another along the
     branch of states that leads on from it, through folds. Without a ring the default is the polarized, swimming state
     on the branch that leaves the sphere at the first pitchfork in the Peclet number.
     """
     check_has_isolated_states(scenario)
+    if scenario.model == "vesicle":
+        found, detail = solve_vesicle(scenario, name)
+        return replace(_steady(scenario, found), detail=detail)
     if scenario.model == "closed-surface":
         sphere = reference(scenario)
         if scenario.values()["ring_amplitude"] == 0.0:
@@ -242,7 +237,9 @@ def solve_steady(scenario: Scenario, name: StateName = StateName.DEFAULT) -> Ste
 
 
 def reference(scenario: Scenario) -> Scenario:
-    """The scenario without ring, coat and pull: its initial state, a sphere or a flat disc, is at rest."""
+    """The scenario without ring, coat and pull: its initial state, a sphere or a flat disc, is at rest; a spheroid nearly so."""
+    if scenario.model == "vesicle":
+        return scenario.with_overrides({"initial_leaning": 0.0})
     if scenario.model == "closed-surface":
         return scenario.with_overrides(
             {"ring_amplitude": 0.0, "initial_background": 1.0, "initial_ring_amplitude": 0.0, "seed_amplitude": 0.0}
@@ -264,27 +261,10 @@ def follow(start: Steady, key: str, value: float) -> Steady:
     at = key_values(start.scenario, (key,))
     if at[0] == value:
         return replace(start, scenario=scenario)
-    first = start_point(problem, start.found.x, at, 0, float(np.sign(value - at[0])), _steps(value - at[0]))
+    first = start_point(problem, start.found.x, at, 0, float(np.sign(value - at[0])), steps(value - at[0]))
     if isinstance(first, Outcome):
         return replace(start, found=replace(start.found, outcome=first))
-    return _steady(scenario, _along(first, value, _steps(value - first.parameter)))
-
-
-def _along(first: Point, value: float, options: Arclength, away: float | None = None) -> Stationary:
-    """The state where the branch from a point comes to a value of its parameter; NO_STATE where it comes to `away` first."""
-    stops = [Stop(Parameter(0), one, "end", ends=True) for one in (value, away) if one is not None]
-    branch = Continuation([first], stops, options, NEWTON)
-    *_, last = [first, *branch]
-    if branch.outcome is Outcome.REACHED_STOP and last.parameter == value:
-        return solve_stationary(last.problem, last.x, last.p, NEWTON)
-    outcome = Outcome.NO_STATE if branch.outcome is Outcome.REACHED_STOP else Outcome.NOT_REACHED
-    still = Rate.of_growth(last.problem.stored(last.x, last.p))
-    residual = float(np.abs(last.problem.residual(last.x, last.p, still)).max())
-    return Stationary(last.problem, last.x, last.p, outcome, np.nan, residual, 0, False)
-
-
-def _steps(span: float) -> Arclength:
-    return Arclength(first=0.02, parameter_scale=abs(span), max_points=MAX_POINTS)
+    return _steady(scenario, along(first, value, steps(value - first.parameter)))
 
 
 def _steady(scenario: Scenario, found: Stationary) -> Steady:
@@ -293,7 +273,7 @@ def _steady(scenario: Scenario, found: Stationary) -> Steady:
 
 
 def _main_key(scenario: Scenario) -> str:
-    return "peclet" if scenario.model == "closed-surface" else "spontaneous_curvature"
+    return MAIN_KEYS[scenario.model]
 
 
 def _sphere(scenario: Scenario, sphere: Scenario) -> Steady:
@@ -318,7 +298,7 @@ def _polarized(scenario: Scenario, sphere: Scenario) -> Steady:
     """
     goal = float(scenario.values()["peclet"])
     resting = _sphere(sphere.with_overrides({"peclet": 0.0}), sphere.with_overrides({"peclet": 0.0}))
-    first = start_point(resting.problem, resting.found.x, np.zeros(1), 0, 1.0, _steps(1.0))
+    first = start_point(resting.problem, resting.found.x, np.zeros(1), 0, 1.0, steps(1.0))
     assert isinstance(first, Point)
     branch = Continuation([first], (), Arclength(first=0.1, largest=0.2, max_points=MAX_POINTS), NEWTON)
     reached = 0.0
@@ -328,7 +308,7 @@ def _polarized(scenario: Scenario, sphere: Scenario) -> Steady:
             fork = one.point.parameter
             side = side_branches(one.point, one.bracket.after.tangent, 0.02)[0]
             away = 2.0 * fork if goal < fork else 0.0
-            found = _along(side, goal, _steps(max(abs(goal - fork), 0.1 * fork)), away)
+            found = along(side, goal, steps(max(abs(goal - fork), 0.1 * fork)), away)
             met = f"The sphere polarizes at peclet = {fork:.8g}; the branch from there comes to no swimmer at {goal:g}."
             return replace(_steady(scenario, found), detail="" if found.outcome.is_success else met)
     detail = f"The sphere does not polarize up to peclet = {reached:.3g}."

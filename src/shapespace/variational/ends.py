@@ -52,5 +52,5 @@ def check_count(fields: int, scalars: tuple[str, ...], ends: list[str], integral
         raise ValueError(
             f"{abs(needed - given)} condition(s) {word}: {fields} fields and the scalars {scalars} need {needed}, given are "
             f"{given}: {ends + integrals}. Each scalar needs its own: length -> gauge alpha(0) = 0, pressure -> volume, "
-            "velocity -> frame z(0) + z(1) = 0."
+            "tension -> area, velocity -> frame z(0) + z(1) = 0."
         )

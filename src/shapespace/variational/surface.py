@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -14,7 +14,7 @@ from shapespace.geometry.motion import Rates, divergence
 from shapespace.numerics.system import AbstractSystem, Symmetry
 from shapespace.physics.force import Pressure
 from shapespace.physics.species import Species
-from shapespace.physics.tension import Incompressibility
+from shapespace.physics.tension import FixedArea, Incompressibility
 from shapespace.physics.term import AbstractTerm, Site
 from shapespace.variational.ends import Ends, Free, Pinned, Traction, check_count, check_ends
 from shapespace.variational.rayleighian import Multipliers, Variation, variation
@@ -30,6 +30,21 @@ STATE_AND_FLUX = {
     "species": ("c", "species_flux"),
 }
 """For each rate the field it changes and the flux conjugate to it."""
+
+
+class Held(NamedTuple):
+    """A quantity of the whole surface that is held: the parameter with its value, its element per du, its multiplier's term."""
+
+    parameter: str
+    element: Callable[[Geometry], Traced]
+    term: Callable[[Traced], AbstractTerm]
+
+
+HELD = {
+    "p": Held("enclosed_volume", volume_element, Pressure),
+    "sigma": Held("surface_area", lambda g: 2.0 * jnp.pi * area_element(g), FixedArea),
+}
+"""By the scalar that is its multiplier."""
 ODD = frozenset({"z", "psi", "alpha", "v", "azimuthal_force", "species_flux", "v0"})
 """Fields and scalars that change sign when z -> -z and u -> 1 - u; psi goes to pi - psi."""
 
@@ -39,7 +54,8 @@ class SurfaceSystem(AbstractSystem):
 
     Fields y: r, z, psi, moment = P_psi, alpha, beta, v = v_u, meridional_force = P_v = r T_uu, then as chosen v_phi and
     P_phi, c and its flux N, the cumulative area a. Algebraic: gamma_H if incompressible. Scalars: h, then p if the
-    volume is fixed and v0 if the frame moves along. z is measured in that frame. Stored: r, z, psi, h and the amount c r h.
+    volume is fixed, sigma if the total area is, and v0 if the frame moves along. z is measured in that frame. Stored: r, z,
+    psi, h and the amount c r h.
     """
 
     fields: tuple[str, ...] = eqx.field(static=True)
@@ -73,6 +89,11 @@ class SurfaceSystem(AbstractSystem):
         """Motions that cost nothing and that a condition holds: translation along the axis, by z(0) + z(1) = 0 with v0 free."""
         return ("translation",) if "v0" in self.scalars else ()
 
+    @property
+    def held(self) -> tuple[str, ...]:
+        """The multipliers of what is held of the whole surface; each has an integral condition."""
+        return tuple(name for name in self.scalars if name in HELD)
+
     def named(self, p: Traced) -> Any:
         """Parameters by name."""
         return SimpleNamespace(**{name: p[i] for i, name in enumerate(self.parameters)})
@@ -105,10 +126,8 @@ class SurfaceSystem(AbstractSystem):
 
     def all_terms(self, a: Traced, s: Traced, p: Traced) -> tuple[AbstractTerm, ...]:
         """The model's terms and those of the constraints, whose multipliers are unknowns."""
-        terms = self.terms(self.named(p))
         scalar = self.scalar_values(s)
-        if "p" in scalar:
-            terms = (*terms, Pressure(scalar["p"]))
+        terms = (*self.terms(self.named(p)), *(HELD[name].term(scalar[name]) for name in self.held))
         if self.algebraic:
             terms = (*terms, Incompressibility(a[0]))
         return terms
@@ -188,14 +207,13 @@ class SurfaceSystem(AbstractSystem):
         return jnp.stack(rows)
 
     def integrands(self, dy: Traced, y: Traced, a: Traced, s: Traced, u: Traced, p: Traced) -> Traced:
-        """The volume element where the volume is fixed."""
-        if "p" not in self.scalars:
-            return jnp.zeros((0,))
-        return volume_element(self.site(dy, y, s, jnp.zeros(5)).geometry)[None]
+        """The elements of what is held: volume, area."""
+        geometry = self.site(dy, y, s, jnp.zeros(5)).geometry
+        return jnp.array([HELD[name].element(geometry) for name in self.held])
 
     def targets(self, s: Traced, p: Traced) -> Traced:
-        """The enclosed volume where it is fixed."""
-        return self.named(p).enclosed_volume[None] if "p" in self.scalars else jnp.zeros((0,))
+        """The values of what is held."""
+        return jnp.array([getattr(self.named(p), HELD[name].parameter) for name in self.held])
 
 
 def make_surface_system(
@@ -206,6 +224,7 @@ def make_surface_system(
     species: Callable[[Any], Species] | None = None,
     incompressible: bool = False,
     fixed_volume: bool = False,
+    fixed_area: bool = False,
     comoving: bool = False,
     azimuthal: bool = False,
     material_area: bool = False,
@@ -228,13 +247,14 @@ def make_surface_system(
         raise ValueError(
             "material_area needs an incompressible surface: only there is the cumulative area a material label."
         )
-    scalars = ("h", *(["p"] if fixed_volume else []), *(["v0"] if comoving else []))
+    multipliers = ["p"] * fixed_volume + ["sigma"] * fixed_area
+    scalars = ("h", *multipliers, *(["v0"] if comoving else []))
     check_ends(ends, tuple(rates))
     if not incompressible and any(isinstance(end, Traction) for pair in ends.values() for end in pair):
         raise ValueError("a Traction end needs an incompressible surface; use Free or Pinned.")
     conditions = [f"{name} at u = {u}" for name in rates for u in (0, 1)] + ["gauge alpha(0) = 0"]
     conditions += ["frame z(0) + z(1) = 0"] * comoving + ["area(0) = 0"] * material_area
-    check_count(len(fields), scalars, conditions, ["enclosed volume"] * fixed_volume)
+    check_count(len(fields), scalars, conditions, [HELD[name].parameter for name in multipliers])
     return SurfaceSystem(
         fields=tuple(fields),
         algebraic=("gamma",) if incompressible else (),

@@ -16,7 +16,11 @@ from shapespace.study.branch_store import Branch
 from shapespace.study.scenario import Scenario
 from shapespace.view import style
 
-TELLING = {"open-membrane": ("height",), "closed-surface": ("velocity", "equator_radius")}
+TELLING = {
+    "open-membrane": ("height",),
+    "closed-surface": ("velocity", "equator_radius"),
+    "vesicle": ("bending_energy",),
+}
 """By model, observables in the order in which they are tried: the velocity of a symmetric surface tells nothing."""
 LEAST_CHANGE = 1e-6
 MARKS = {"fold": "s", "pitchfork": "D", "transcritical": "D", "branch-point": "D", "hopf": "o", "user": "|", "end": ""}

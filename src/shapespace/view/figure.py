@@ -50,7 +50,9 @@ _LAYOUTS = {
     "ring-slipping": Layout("ring_position", twin="velocity", with_swim=True),
     "polar-swimmer": Layout("velocity", twin="polarity", with_swim=True),
     "guided-division": Layout("equator_radius", words="neck radius", with_inset=True),
+    "vesicle": Layout("bending_energy"),
 }
+_BY_MODEL = {"open-membrane": "membrane-protrusion", "vesicle": "vesicle"}
 _GENERIC_CURVES = ("equator_radius", "height", "neck_radius", "ring_position", "length", "area", "velocity")
 
 
@@ -59,8 +61,8 @@ def layout_of(dataset: xr.Dataset) -> Layout:
     scenario = str(dataset.attrs.get("scenario", ""))
     if scenario in _LAYOUTS:
         return _LAYOUTS[scenario]
-    if dataset.attrs.get("model") == "open-membrane":
-        return _LAYOUTS["membrane-protrusion"]
+    if (model := dataset.attrs.get("model")) in _BY_MODEL:
+        return _LAYOUTS[_BY_MODEL[model]]
     curve = next((name for name in _GENERIC_CURVES if name in dataset), _GENERIC_CURVES[0])
     swims = curve != "velocity" and _swims(dataset)
     return Layout(curve, twin="velocity" if swims else None, with_swim=swims, with_inset=True)
