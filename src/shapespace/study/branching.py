@@ -230,7 +230,8 @@ def _follow(
                 return first
             record(surveyor.start(*first))
         ended = next((Outcome(point.ends) for point in done if point.leg == leg and point.ends), None)
-        if ended not in ENDS:
+        # A leg that gave up is tried again by a resumed call, unless the other one follows it in the store.
+        if ended is None or (ended not in ENDS and not any(point.leg > leg for point in done)):
             past = _past(surveyor, done, leg)
             for point in _leg(surveyor, request, past, leg, done):
                 record(point)
