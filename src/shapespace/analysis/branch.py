@@ -12,10 +12,10 @@ from shapespace.analysis.extended import Affine, ExtendedProblem
 from shapespace.base.arrays import Array
 from shapespace.base.problem import AbstractContinuableProblem, AbstractLinearisation, Rate
 
-TANGENT_ERROR = 1e-6
-"""Of a tangent found with factors from nearby, in the norm of the problem."""
-NEARBY = 0.1
-"""Factors stand for the Jacobian at a point where they reduce the error of any solution at least this much."""
+TANGENT_ERROR = 1e-4
+"""Last correction of a tangent found with factors from nearby, in the norm of the problem; predictions need no better."""
+MAX_CORRECTIONS = 4
+"""Of such a tangent; new factors cost as much."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Point:
 
     p (n_p,): all parameters. tangent (n + 1,): (dx, dp[index]) per arclength, of unit length in the `metric`. arclength:
     from the start. step: the next one to try. sign: of the determinant of [[F_x, F_p], [tangent]], comparable between
-    states of equal size; NaN where it is unknown. label: why the branch stopped here, if it did.
+    states of equal size, at a state within the error of prediction; NaN where it is unknown. label: why the branch stopped here, if it did.
     """
 
     problem: AbstractContinuableProblem
@@ -79,10 +79,10 @@ def orthogonal_plane(point: Point, row: Array, through: Array) -> ExtendedProble
 
 
 class Direction(NamedTuple):
-    """A tangent (n + 1,), not yet of unit length, and the sign of the bordered determinant."""
+    """A tangent (n + 1,), not yet of unit length, and the factorised Jacobian bordered by the row of a plane that gave it."""
 
     tangent: Array
-    sign: float
+    linearisation: AbstractLinearisation
 
 
 def direction_at(
@@ -90,37 +90,37 @@ def direction_at(
 ) -> Direction | None:
     """The tangent at X across a plane, row . tangent = 1; None where the bordered Jacobian is singular.
 
-    nearby: factors of it at a state nearby. Where they are near enough to leave the sign of the determinant in no doubt, the
-    tangent is found by iteration with them, which is cheaper than new factors.
+    nearby: its factors where X was predicted. The tangent is found by iteration with them where that converges.
     """
     unit = np.zeros_like(X)
     unit[-1] = 1.0
-    if nearby is not None and _is_near(nearby, plane, X, p):
-        tangent = nearby.solve(unit)
-        for _ in range(5):
+    if nearby is not None:
+        tangent, last = nearby.solve(unit), np.inf
+        for _ in range(MAX_CORRECTIONS):
             correction = nearby.solve(plane.derivative(X, p, tangent) - unit)
-            tangent = tangent - correction
-            if plane.norm(correction, X) <= TANGENT_ERROR:
-                return Direction(tangent, nearby.sign)
+            tangent, size = tangent - correction, plane.norm(correction, X)
+            if size <= TANGENT_ERROR:
+                return Direction(tangent, nearby)
+            if size > 0.5 * last:
+                break
+            last = size
     _, linearisation = plane.linearise(X, p, rate)
     if linearisation.is_singular:
         return None
-    return Direction(linearisation.solve(unit), linearisation.sign)
+    return Direction(linearisation.solve(unit), linearisation)
 
 
-def _is_near(nearby: AbstractLinearisation, plane: ExtendedProblem, X: Array, p: Array) -> bool:
-    """Whether A0^-1 A v is v but for a small part, for a v = A0^-1 b in which directions that A0 almost annuls stand out.
+def singularity(linearisation: AbstractLinearisation, size: int) -> float:
+    """1/(l . A^-1 g) of a factorised A (size, size) for fixed generic l, g: it crosses zero with the determinant of A.
 
-    The determinants of A0 and A can differ in sign only where A0^-1 A has a negative eigenvalue.
+    Smooth along a branch on one discretisation, and of moderate size unlike the determinant.
     """
-    generic = nearby.solve(_generic(len(X)))
-    missing = generic - nearby.solve(plane.derivative(X, p, generic))
-    return plane.norm(missing, X) <= NEARBY * plane.norm(generic, X)
+    return float(1.0 / (_generic(size, 1) @ linearisation.solve(_generic(size, 0))))
 
 
 @cache
-def _generic(size: int) -> Array:
-    return np.random.default_rng(0).standard_normal(size)
+def _generic(size: int, number: int) -> Array:
+    return np.random.default_rng(number).standard_normal(size)
 
 
 def hermite(start: Array, start_slope: Array, end: Array, end_slope: Array, length: float) -> Array:
@@ -173,12 +173,17 @@ def all_brackets(points: Sequence[Point]) -> list[Bracket]:
     return [bracket for pair in pairwise(points) for bracket in brackets(*pair)]
 
 
+def direction_of(point: Point, parameter_scale: float = 0.0) -> Direction | None:
+    """The direction at a point, across the plane orthogonal to the tangent that it has."""
+    X = point.joined
+    plane = orthogonal_plane(point, metric(point.problem, X, parameter_scale) * point.tangent, X)
+    return direction_at(plane, X, point.p, Rate.of_growth(point.problem.stored(point.x, point.p)))
+
+
 def sign_on(point: Point, problem: AbstractContinuableProblem) -> float:
     """The sign of a point, comparable with that of states on another discretisation; NaN where it is unknown."""
     there = point.on(problem)
     if not np.isnan(there.sign):
         return there.sign
-    X = there.joined
-    plane = orthogonal_plane(there, metric(problem, X) * there.tangent, X)
-    direction = direction_at(plane, X, there.p, Rate.of_growth(problem.stored(there.x, there.p)))
-    return float("nan") if direction is None else direction.sign
+    direction = direction_of(there)
+    return float("nan") if direction is None else direction.linearisation.sign

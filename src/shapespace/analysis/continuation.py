@@ -2,16 +2,28 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
 
-from shapespace.analysis.branch import Point, direction_at, hermite, metric, orthogonal_plane, real_roots, sign_on
+from shapespace.analysis.branch import (
+    Direction,
+    Point,
+    direction_at,
+    hermite,
+    metric,
+    orthogonal_plane,
+    real_roots,
+    sign_on,
+    singularity,
+)
 from shapespace.analysis.extended import AbstractMeasure, ExtendedProblem, Given, Parameter
 from shapespace.analysis.stationary import STEP_NEWTON
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractContinuableProblem, Rate
+from shapespace.base.problem import AbstractContinuableProblem, AbstractLinearisation, Rate
 from shapespace.numerics.newton import Newton, solve_root
 
 MEMORY = 4
@@ -92,7 +104,7 @@ def start_point(
             turned = tangent is None and unit[-1] * direction < 0.0
             unit = -unit if turned else unit
             again = direction_at(orthogonal_plane(point, weights * unit, X), X, p, rate)
-            return replace(point, tangent=unit, sign=float("nan") if again is None else again.sign)
+            return replace(point, tangent=unit, sign=float("nan") if again is None else again.linearisation.sign)
     if tangent is None:
         return Outcome.SINGULAR
     return replace(point, tangent=tangent / np.sqrt(weights @ tangent**2))
@@ -147,9 +159,11 @@ class Continuation:
         trial = _Trial(places, self.options, self.newton)
         step = past[-1].step
         while step >= self.options.smallest:
-            accepted = trial.step(step)
-            if accepted is not None:
-                accepted = self._stopped(trial, accepted)
+            ahead = trial.step(step)
+            if isinstance(ahead, _Crossed):
+                step = ahead.before
+                continue
+            accepted = None if ahead is None else self._stopped(trial, ahead)
             if accepted is not None:
                 return accepted
             step *= 0.5
@@ -161,11 +175,19 @@ class Continuation:
         return trial.stop(end, *min(crossings, key=lambda crossing: crossing[0])) if crossings else end
 
 
+class _Crossed(NamedTuple):
+    """Arclength ahead to a branch point, and to a place shortly before it, from where a short step crosses it."""
+
+    at: float
+    before: float
+
+
 class _Trial:
     """Steps from one point on one discretisation, of any length."""
 
     def __init__(self, places: Sequence[Point], options: Arclength, newton: Newton) -> None:
         self.places, self.now, self.options, self.newton = places, places[-1], options, newton
+        self.crossed: _Crossed | None = None
         self.X = self.now.joined
         self.metric = metric(self.now.problem, self.X, options.parameter_scale)
         self.row = self.metric * self.now.tangent
@@ -181,7 +203,7 @@ class _Trial:
                 return np.asarray(polyval(length + step, cubic)), 4
         return self.X + step * now.tangent, 2
 
-    def step(self, step: float) -> Point | None:
+    def step(self, step: float) -> Point | _Crossed | None:
         """The point ahead; None where Newton fails or may have left the branch, or where too much lies between."""
         options = self.options
         guess, order = self.predicted(step)
@@ -195,18 +217,39 @@ class _Trial:
         found = direction_at(plane, root.x, self.now.p, self.rate, root.linearisation)
         if found is None:
             return None
-        point = self._point(plane, root.x, found.tangent, found.sign)
+        point = self._point(plane, root.x, found)
         lengths = np.sqrt((self.row @ self.now.tangent) * (self.metric @ point.tangent**2))
         turn = float(np.arccos(np.minimum(self.row @ point.tangent / lengths, 1.0))) / options.turn
         if not turn <= 1.0 or _hides_folds(self.now, point):
             return None
         if step > options.crossing and self.now.sign * point.sign < 0.0:
-            return None
-        factor = min(MAX_GROWTH, 0.9 * max(error, 1e-12) ** (-1.0 / order), 0.5 / max(turn, 1e-12))
+            return self._crossed(step, found.linearisation)
+        factor = min(0.9 * max(error, 1e-12) ** (-1.0 / order), 0.5 / max(turn, 1e-12))
         if root.jacobians > 2:
             factor = min(factor, 0.7)
-        following = min(max(factor, 0.2) * step, options.largest)
+        # Where short steps crossed a branch point, those before it say what the branch allows.
+        growth = max(MAX_GROWTH * step, self._longest_step)
+        following = min(max(factor, 0.2) * step, growth, options.largest)
+        if self.crossed is not None:
+            following = min(following, max(self.crossed.at - step, 0.0) + 0.5 * options.crossing)
         return replace(point, step=following, iterations=root.iterations, jacobians=root.jacobians)
+
+    @property
+    def _longest_step(self) -> float:
+        """Largest distance of neighbours among the places."""
+        return max((b.arclength - a.arclength for a, b in pairwise(self.places)), default=0.0)
+
+    def _crossed(self, step: float, there: AbstractLinearisation) -> _Crossed | None:
+        """Where the branch point lies that a step has crossed; None where its ends do not tell."""
+        here = direction_at(orthogonal_plane(self.now, self.row, self.X), self.X, self.now.p, self.rate)
+        if here is None:
+            return None
+        start, end = (singularity(one, len(self.X)) for one in (here.linearisation, there))
+        if not start * end < 0.0:
+            return None
+        at = step * start / (start - end)
+        self.crossed = _Crossed(at, max(at - 0.4 * self.options.crossing, self.options.crossing, 0.05 * step))
+        return self.crossed
 
     def stop(self, end: Point, s: float, stop: Stop) -> Point | None:
         """The exact point of a stop near arclength s on the way to an end; None where Newton fails or ends far off."""
@@ -222,21 +265,21 @@ class _Trial:
             return None
         if stop.measure == Parameter(now.index):
             X[-1] = stop.value
-        plane = orthogonal_plane(now, self.row, X)
-        found = direction_at(plane, X, now.p, self.rate)
+        found = direction_at(orthogonal_plane(now, self.row, X), X, now.p, self.rate)
         if found is None:
             return None
-        point = self._point(plane, X, found.tangent, found.sign)
+        point = self._point(fixed, X, found)
         return replace(point, step=end.step, iterations=root.iterations, jacobians=root.jacobians, label=stop.label)
 
-    def _point(self, plane: ExtendedProblem, X: Array, tangent: Array, sign: float) -> Point:
+    def _point(self, problem: ExtendedProblem, X: Array, found: Direction) -> Point:
         """A point at X, its arclength by the chord in the metrics of both of its ends."""
-        x, p = plane.split(X, self.now.p)
+        x, p = problem.split(X, self.now.p)
         there = metric(self.now.problem, X, self.options.parameter_scale)
         chord = (X - self.X) ** 2
         length = 0.5 * (np.sqrt(self.metric @ chord) + np.sqrt(there @ chord))
-        unit = tangent / np.sqrt(there @ tangent**2)
-        return Point(self.now.problem, x, p, self.now.index, unit, self.now.arclength + float(length), sign=sign)
+        unit = found.tangent / np.sqrt(there @ found.tangent**2)
+        arclength, sign = self.now.arclength + float(length), found.linearisation.sign
+        return Point(self.now.problem, x, p, self.now.index, unit, arclength, sign=sign)
 
 
 def _hides_folds(start: Point, end: Point) -> bool:

@@ -14,6 +14,9 @@ from shapespace.numerics.newton import Newton, Root, solve_root
 START_LIMIT = 4.0**7
 """How much longer than asked the first step may be where Newton needs it."""
 
+MEMORY = 4
+"""Moments that are remembered: their cubic predicts the next state, whatever the order of differentiation."""
+
 STEP_NEWTON = Newton(max_iterations=12, min_damping=1.0 / 32.0)
 """Patience of a time step: where Newton needs more, a shorter step is cheaper."""
 
@@ -176,7 +179,7 @@ class Evolution:
         weights = derivative_weights(np.array([time, *self._times[:order]]))
         history = sum((w * q for w, q in zip(weights[1:], self._stored, strict=False)), np.zeros_like(self._stored[0]))
         rate = Rate(float(weights[0]), history)
-        points = min(order + 1, len(self._times))
+        points = min(MEMORY, len(self._times))
         extrapolation = extrapolation_weights(time, np.array(self._times[:points]))
         if guess is None:
             guess = sum((w * x for w, x in zip(extrapolation, self._states, strict=False)), 0.0 * self._states[0])
@@ -201,10 +204,9 @@ class Evolution:
         return factor * problem.stored_norm(stored - predicted, stored)
 
     def _remember(self, moment: Moment, stored: Array) -> None:
-        keep = self.stepping.order + 1
-        self._times = [moment.time, *self._times][:keep]
-        self._states = [moment.x, *self._states][:keep]
-        self._stored = [stored, *self._stored][:keep]
+        self._times = [moment.time, *self._times][:MEMORY]
+        self._states = [moment.x, *self._states][:MEMORY]
+        self._stored = [stored, *self._stored][:MEMORY]
 
     def _ending(self, now: Moment) -> Outcome | None:
         """Why to stop at this moment, if anything says so."""

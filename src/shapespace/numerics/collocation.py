@@ -13,14 +13,17 @@ from shapespace.numerics import condensation
 from shapespace.numerics.adaptation import adapted_mesh
 from shapespace.numerics.border import with_border
 from shapespace.numerics.gauss import gauss_rule
-from shapespace.numerics.layout import by_element, by_stage, continuity, lay_out
-from shapespace.numerics.pointwise import TILES, Density, Functions, Tile, Values, compiled_functions
+from shapespace.numerics.layout import assembled, by_element, joined, lay_out
+from shapespace.numerics.pointwise import Density, Functions, compiled_functions, points_per_tile, stored_quantities
 from shapespace.numerics.small_lu import compiled
 from shapespace.numerics.state import State
 from shapespace.numerics.system import AbstractSystem
 
 RELATIVE_FLOOR = 1.0
 """Fields and scalars smaller than this are measured absolutely in norms; problems are dimensionless and of order one."""
+
+REST = Rate(0.0, np.zeros(0))
+"""dq/dt = 0, whatever q."""
 
 
 @compiled
@@ -89,6 +92,11 @@ class CollocationProblem(AbstractSmoothProblem):
         return self.n + len(self.system.algebraic)
 
     @cached_property
+    def n_stored(self) -> int:
+        """Stored quantities n_q."""
+        return stored_quantities(self.system)
+
+    @cached_property
     def _widths(self) -> Array:
         return np.diff(self.mesh)
 
@@ -121,58 +129,37 @@ class CollocationProblem(AbstractSmoothProblem):
 
     @cached_property
     def _tile(self) -> int:
-        """Points per tile."""
-        return next((size for size in TILES if size >= self._points), TILES[-1])
-
-    @cached_property
-    def _padded(self) -> int:
-        return -(-self._points // self._tile) * self._tile
-
-    @cached_property
-    def _u(self) -> Array:
-        """u at the points, padded."""
-        points = self.mesh[:-1, None] + self._widths[:, None] * gauss_rule(self.degree).points
-        return by_stage(points.reshape(-1, 1), self.degree, self._padded)[:, 0]
+        return points_per_tile(self._points)
 
     @cached_property
     def _shares(self) -> Array:
         """Quadrature weights of the points."""
         return np.asarray((gauss_rule(self.degree).weights[:, None] * self._widths).ravel())
 
-    def _rows(self, x: Array) -> tuple[Array, Array]:
-        """Rows of all points, padded, and the ends; linear in x."""
+    def _tiles(self, x: Array, p: Array, rate: Rate = REST) -> Array:
+        """All points, and the ends with each tile; linear in (x, p)."""
         rule = gauss_rule(self.degree)
-        rows, ends = lay_out(x, self._widths, rule.matrix, self.n, self.n_rows - self.n, self._padded)
-        return rows, ends
+        return lay_out(
+            x, p, rate.coefficient, rate.history, self.mesh, rule.matrix, rule.points, self.n, self.n_rows - self.n,
+            self.n_stored, self._tile,
+        )  # fmt: skip
 
-    def _tiles(self, x: Array, history: Array) -> list[Tile]:
-        """All points, and the ends with each tile."""
-        rows, ends = self._rows(x)
-        history = history.reshape(self._points + 2, -1)
-        inner = by_stage(history[:-2], self.degree, self._padded)
-        return [Tile(rows[cut], inner[cut], self._u[cut], ends, history[-2:]) for cut in self._cuts]
-
-    def _assembled(self, parts: Sequence[Values], x: Array) -> Array:
-        """The flat residual from the values on all tiles: equations, continuity, end conditions, integral conditions."""
-        rows = _joined([part.rows for part in parts])[: self._points]
-        jumps = continuity(x, self._widths, gauss_rule(self.degree).weights, self.n)
-        ends, targets = np.asarray(parts[0].ends), np.asarray(parts[0].targets)
-        equations = by_element(rows[:, : self.n_rows], self.degree)
-        integrals = self._shares @ rows[:, self.n_rows :] - targets
-        return np.concatenate([equations.ravel(), jumps, ends, integrals])
+    def _assembled(self, parts: Sequence[Any], x: Array) -> Array:
+        """The flat residual from the flat values of all tiles: equations, continuity, end conditions, integral conditions."""
+        values = np.asarray(parts[0])[None] if len(parts) == 1 else np.stack(parts)
+        weights, n_i = gauss_rule(self.degree).weights, self.n_integrals
+        return assembled(values, x, self.mesh, weights, self.n, self.n_rows, n_i, self._tile)
 
     def residual(self, x: Array, p: Array, rate: Rate) -> Array:
         """Equations at the Gauss points, continuity, end conditions, integral conditions."""
-        parts = [self.functions.values(tile, rate.coefficient, p) for tile in self._tiles(x, rate.history)]
-        return self._assembled(parts, x)
+        return self._assembled([self.functions.values(tile) for tile in self._tiles(x, p, rate)], x)
 
     def blocks(self, x: Array, p: Array, rate: Rate) -> tuple[Array, Array, Array, Array]:
         """Residual, and the Jacobian's blocks: points (m + n_i, m + n + n_s, k, N), ends, targets."""
-        tiles = self._tiles(x, rate.history)
-        out = [self.functions.linearised(tile, rate.coefficient, p) for tile in tiles]
+        out = [self.functions.linearised(tile) for tile in self._tiles(x, p, rate)]
         slopes = out[0][1]
-        joined = _joined([part.rows for _, part in out], axis=-1)[..., : self._points]
-        points = np.ascontiguousarray(joined).reshape(*joined.shape[:2], self.degree, self.elements)
+        points = np.ascontiguousarray(joined([part.rows for _, part in out], self._points))
+        points = points.reshape(*points.shape[:2], self.degree, self.elements)
         residual = self._assembled([values for values, _ in out], x)
         return residual, points, np.asarray(slopes.ends), np.asarray(slopes.targets)
 
@@ -189,49 +176,31 @@ class CollocationProblem(AbstractSmoothProblem):
         factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *extra)
         return residual, CollocationLinearisation(self, factors)
 
-    @cached_property
-    def _cuts(self) -> list[slice]:
-        return [slice(start, start + self._tile) for start in range(0, self._padded, self._tile)]
-
     def derivative(self, x: Array, p: Array, dx: Array, dp: Array) -> Array:
         """F_x dx + F_p dp at rest, flat as the residual."""
-        (rows, ends), (drows, dends) = self._rows(x), self._rows(dx)
-        parts = [
-            self.functions.derivative(self._u[cut], (rows[cut], ends, p), (drows[cut], dends, dp)) for cut in self._cuts
-        ]
-        return self._assembled(parts, dx)
+        tiles = zip(self._tiles(x, p), self._tiles(dx, dp), strict=True)
+        return self._assembled([self.functions.derivative(at, along) for at, along in tiles], dx)
 
     def second_derivative(self, x: Array, p: Array, one: Array, dp: Array, other: Array, ep: Array) -> Array:
         """F'' along (one, dp) and (other, ep) at rest, flat as the residual."""
-        (rows, ends), (d, dends), (e, eends) = self._rows(x), self._rows(one), self._rows(other)
-        parts = [
-            self.functions.second_derivative(
-                self._u[cut], (rows[cut], ends, p), (d[cut], dends, dp), (e[cut], eends, ep)
-            )
-            for cut in self._cuts
-        ]
-        return self._assembled(parts, np.zeros_like(x))
+        tiles = zip(self._tiles(x, p), self._tiles(one, dp), self._tiles(other, ep), strict=True)
+        return self._assembled([self.functions.second_derivative(*tile) for tile in tiles], np.zeros_like(x))
 
     def mass(self, x: Array, p: Array, dx: Array) -> Array:
         """dF/d(dq/dt) dq/dx dx at rest, flat as the residual."""
-        (rows, ends), (drows, dends) = self._rows(x), self._rows(dx)
-        parts = [self.functions.mass(self._u[cut], (rows[cut], ends, p), drows[cut], dends) for cut in self._cuts]
-        return self._assembled(parts, np.zeros_like(x))
+        tiles = zip(self._tiles(x, p), self._tiles(dx, np.zeros_like(p)), strict=True)
+        return self._assembled([self.functions.mass(at, along) for at, along in tiles], np.zeros_like(x))
 
     def stored(self, x: Array, p: Array) -> Array:
         """q at the Gauss points and at both ends, flattened."""
-        rows, ends = self._rows(x)
-        parts = [self.functions.stored(rows[cut], ends) for cut in self._cuts]
-        inner = by_element(_joined([part for part, _ in parts])[: self._points], self.degree)
+        parts = [self.functions.stored(tile) for tile in self._tiles(x, p)]
+        inner = by_element(joined([part for part, _ in parts], self._points), self.degree)
         return np.concatenate([inner, np.asarray(parts[0][1])]).ravel()
 
     def integrals(self, density: Density, x: Array, p: Array, rate: Rate) -> tuple[dict[str, float], dict[str, float]]:
         """Gauss quadrature of density(system, dy, y, a, s, dq, p) over u, by name, and the largest point values."""
-        parts = [
-            self.functions.densities(density, tile.rows, tile.history, rate.coefficient, p)
-            for tile in self._tiles(x, rate.history)
-        ]
-        values = {name: _joined([part[name] for part in parts])[: self._points] for name in parts[0]}
+        parts = [self.functions.densities(density, tile) for tile in self._tiles(x, p, rate)]
+        values = {name: joined([part[name] for part in parts], self._points) for name in parts[0]}
         sums = {name: float(self._shares @ value) for name, value in values.items()}
         return sums, {name: float(value.max()) for name, value in values.items()}
 
@@ -298,8 +267,3 @@ class CollocationProblem(AbstractSmoothProblem):
         if symmetry is None:
             return None
         return self.pack(self.unpack(x).reflected(symmetry, increment).on_mesh(self.mesh))
-
-
-def _joined(parts: Sequence[Any], axis: int = 0) -> Array:
-    """Results of all tiles, one after another."""
-    return np.asarray(parts[0]) if len(parts) == 1 else np.concatenate(parts, axis=axis)

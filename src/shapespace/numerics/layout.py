@@ -1,8 +1,16 @@
-"""Between packed vectors of a collocation problem and rows of its Gauss points, which point functions take by tiles.
+"""Between flat vectors of a collocation problem and tiles, flat vectors of a fixed number of points that compiled functions take.
 
-Rows run stage by stage, over all elements in each (row j N + e), as the elimination wants them; packed vectors and stored
-quantities run element by element.
+Points run stage by stage, over all elements in each (point j N + e), as the elimination wants them; states, residuals and
+stored quantities run element by element. A tile of T points packs
+
+    slopes (n, T), algebraic (n_a, T), fields (n, T), history (n_q, T), u (T,), scalars (n_s,),
+    y(0) (n,), y(1) (n,), history at both ends (2, n_q), coefficient, parameters (n_p,)
+
+and what comes back packs rows (m + n_i, T) of equations and integrands, end conditions (n_b,), targets (n_i,). One flat vector
+each, because handing an array to a compiled function costs as much as evaluating it at ten points.
 """
+
+from typing import Any
 
 import numpy as np
 
@@ -10,65 +18,85 @@ from shapespace.numerics.small_lu import Array, compiled
 
 
 @compiled
-def lay_out(x, widths, matrix, n, n_a, padded):  # type: ignore[no-untyped-def]
-    """Rows (padded, 2n + n_a + n_s) of (slope, algebraic, field, scalars); the ends (2n + n_s,).
+def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, points_per_tile):  # type: ignore[no-untyped-def]
+    """Tiles (n_tiles, size) of x and all else that they hold; history (N k + 2, n_q), flat, or empty for zero. Linear in x.
 
-    x packs nodes, slopes, algebraic fields and scalars. Rows beyond the last point repeat it. Linear in x.
+    stages (k,): the Gauss points on [0, 1]; matrix (k, k): integrals of their basis. Points beyond the last repeat it.
     """
-    elements, k = widths.shape[0], matrix.shape[0]
+    elements, k, size = mesh.shape[0] - 1, matrix.shape[0], points_per_tile
     slopes = (elements + 1) * n
     algebraic = slopes + elements * k * n
     scalars = algebraic + elements * k * n_a
-    n_s = x.shape[0] - scalars
-    rows = np.empty((padded, 2 * n + n_a + n_s))
-    for j in range(k):
-        for e in range(elements):
-            row, first = rows[j * elements + e], slopes + e * k * n
-            own = first + j * n
-            for c in range(n):
-                row[c] = x[own + c]
-                value = 0.0
-                for l in range(k):
-                    value += matrix[j, l] * x[first + l * n + c]
-                row[n + n_a + c] = x[e * n + c] + widths[e] * value
-            for c in range(n_a):
-                row[n + c] = x[algebraic + (e * k + j) * n_a + c]
-            for c in range(n_s):
-                row[2 * n + n_a + c] = x[scalars + c]
-    for point in range(elements * k, padded):
-        rows[point] = rows[elements * k - 1]
-    ends = np.empty(2 * n + n_s)
-    ends[:n] = x[:n]
-    ends[n : 2 * n] = x[elements * n : slopes]
-    ends[2 * n :] = x[scalars:]
-    return rows, ends
+    n_s, n_p = x.shape[0] - scalars, p.shape[0]
+    n_points, moves = elements * k, history.shape[0] > 0
+    n_tiles = (n_points + size - 1) // size
+    first_ends = (2 * n + n_a + n_q + 1) * size
+    out = np.zeros((n_tiles, first_ends + n_s + 2 * n + 2 * n_q + 1 + n_p))
+    for point in range(n_tiles * size):
+        j, e = divmod(min(point, n_points - 1), elements)
+        column = out[point // size, point % size : first_ends : size]
+        width, own = mesh[e + 1] - mesh[e], e * k + j
+        left, inside = x[e * n : (e + 1) * n], x[slopes + e * k * n : slopes + (e + 1) * k * n].reshape(k, n)
+        for c in range(n):
+            value = 0.0
+            for l in range(k):
+                value += matrix[j, l] * inside[l, c]
+            column[c] = inside[j, c]
+            column[n + n_a + c] = left[c] + width * value
+        for c in range(n_a):
+            column[n + c] = x[algebraic + own * n_a + c]
+        if moves:
+            for c in range(n_q):
+                column[2 * n + n_a + c] = history[own * n_q + c]
+        column[2 * n + n_a + n_q] = mesh[e] + width * stages[j]
+    for index in range(n_tiles):
+        ends = out[index, first_ends:]
+        ends[:n_s] = x[scalars:]
+        ends[n_s : n_s + n] = x[:n]
+        ends[n_s + n : n_s + 2 * n] = x[elements * n : slopes]
+        if moves:
+            ends[n_s + 2 * n : n_s + 2 * n + 2 * n_q] = history[n_points * n_q :]
+        ends[n_s + 2 * n + 2 * n_q] = coefficient
+        ends[n_s + 2 * n + 2 * n_q + 1 :] = p
+    return out
 
 
 @compiled
-def continuity(x, widths, weights, n):  # type: ignore[no-untyped-def]
-    """Y_{e+1} - Y_e - w_e sum_l b_l slope_el, flat (N n,)."""
-    elements, k = widths.shape[0], weights.shape[0]
-    slopes = (elements + 1) * n
-    out = np.empty(elements * n)
+def assembled(values, x, mesh, weights, n, m, n_i, points_per_tile):  # type: ignore[no-untyped-def]
+    """The flat residual from what came back (n_tiles, size): equations, continuity of x, end conditions, integral conditions."""
+    elements, k, size = mesh.shape[0] - 1, weights.shape[0], points_per_tile
+    slopes, equations = (elements + 1) * n, elements * k * m
+    border = values[0, (m + n_i) * size :]
+    n_b = border.shape[0] - n_i
+    out = np.empty(equations + elements * n + border.shape[0])
+    integrals = out[equations + elements * n + n_b :]
+    for q in range(n_i):
+        integrals[q] = -border[n_b + q]
+    for j in range(k):
+        for e in range(elements):
+            point = j * elements + e
+            tile, column = values[point // size], point % size
+            for c in range(m):
+                out[(e * k + j) * m + c] = tile[c * size + column]
+            for q in range(n_i):
+                integrals[q] += weights[j] * (mesh[e + 1] - mesh[e]) * tile[(m + q) * size + column]
     for e in range(elements):
         for c in range(n):
             total = 0.0
             for l in range(k):
                 total += weights[l] * x[slopes + (e * k + l) * n + c]
-            out[e * n + c] = x[(e + 1) * n + c] - x[e * n + c] - widths[e] * total
-    return out
-
-
-def by_stage(values: Array, k: int, padded: int) -> Array:
-    """Rows (k N, q), element by element, as rows (padded, q), stage by stage, the last one repeated."""
-    points, q = values.shape
-    out = np.empty((padded, q))
-    out[:points].reshape(k, points // k, q)[:] = values.reshape(points // k, k, q).transpose(1, 0, 2)
-    out[points:] = out[points - 1]
+            out[equations + e * n + c] = x[(e + 1) * n + c] - x[e * n + c] - (mesh[e + 1] - mesh[e]) * total
+    out[equations + elements * n : equations + elements * n + n_b] = border[:n_b]
     return out
 
 
 def by_element(rows: Array, k: int) -> Array:
-    """Rows (k N, q), stage by stage, as rows (k N, q), element by element."""
-    points, q = rows.shape
-    return np.asarray(rows.reshape(k, points // k, q).transpose(1, 0, 2).reshape(points, q))
+    """Rows (q, k N), stage by stage, as rows (k N, q), element by element."""
+    q, points = rows.shape
+    return np.asarray(rows.reshape(q, k, points // k).transpose(2, 1, 0).reshape(points, q))
+
+
+def joined(parts: list[Any], points: int) -> Array:
+    """Results (..., T) of all tiles, one after another, without the points beyond the last."""
+    whole = np.asarray(parts[0]) if len(parts) == 1 else np.concatenate(parts, axis=-1)
+    return whole[..., :points]

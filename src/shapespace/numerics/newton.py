@@ -13,6 +13,8 @@ NEGLIGIBLE = 1e-12
 """Corrections smaller than this, relative to the unknowns, need no further look."""
 ROUND_OFF_SPREAD = 10.0
 """Corrections up to this many times a sample of the round-off count as round-off; on surfaces they are 1 to 5 times it."""
+SLOW = 0.5
+"""Corrections that shrink by less than this factor say little of the error left."""
 NEAR = 1e-3
 """Corrections larger than this are never round-off."""
 
@@ -21,8 +23,8 @@ NEAR = 1e-3
 class Newton:
     """Options. tolerance: accepted size of the last correction, in the problem's norm.
 
-    That correction must be smaller than the one before by `reuse_contraction`, and so is the error left, unless
-    round-off lets corrections shrink no more. max_iterations, min_damping: patience.
+    The error left, as the last two corrections let expect, must be smaller by `reuse_contraction`, unless round-off lets
+    corrections shrink no more. max_iterations, min_damping: patience.
     """
 
     tolerance: float = 1e-8
@@ -60,10 +62,11 @@ def solve_root(
     """Solve F(x, dq/dt; p) = 0 from the guess x.
 
     A full or damped step is accepted where the simplified correction of the trial point has shrunk by 1 - damping/4
-    (natural monotonicity test, Deuflhard 2011, Sec. 3.3): the test does not depend on how equations are scaled. While
-    corrections shrink by `reuse_contraction` the Jacobian is kept. `linearisation`: factors from a nearby state to try first.
+    (natural monotonicity test, Deuflhard 2011, Sec. 3.3): the test does not depend on how equations are scaled. The Jacobian is
+    kept while corrections shrink by `reuse_contraction`, or one more like the last will do. `linearisation`: factors from a
+    nearby state to try first.
     """
-    jacobians = 0
+    jacobians, goal = 0, newton.reuse_contraction * newton.tolerance
     residual = x[:0] if linearisation is None else problem.residual(x, p, rate)
     step, size = None, np.inf
     for iteration in range(1, newton.max_iterations + 1):
@@ -81,7 +84,10 @@ def solve_root(
         if size <= NEGLIGIBLE:
             return Root(x + step, Outcome.CONVERGED, iteration, jacobians, size, linearisation)
         trial = _damped_step(problem, linearisation, x, p, rate, step, size, newton)
-        contracts = trial is not None and trial.damping == 1.0 and trial.size <= newton.reuse_contraction * size
+        contracts = trial is not None and (
+            trial.contraction <= newton.reuse_contraction
+            or (trial.contraction <= SLOW and trial.contraction * trial.error_left <= goal)
+        )
         # Factors from another state are not trusted here: round-off may hide an error that they reduce slowly.
         may_stagnate = not contracts and jacobians > 0 and size <= NEAR
         if may_stagnate and size <= ROUND_OFF_SPREAD * _round_off(problem, linearisation, x, residual, p, rate):
@@ -93,7 +99,7 @@ def solve_root(
             linearisation = None
             continue
         x, residual = trial.x, trial.residual
-        if contracts and trial.size <= newton.tolerance:
+        if contracts and trial.size <= newton.tolerance and trial.error_left <= goal:
             return Root(x + trial.correction, Outcome.CONVERGED, iteration, jacobians, trial.size, linearisation)
         if contracts:
             # The simplified correction is the next step with the Jacobian kept.
@@ -117,13 +123,21 @@ def _round_off(
 
 
 class _Trial(NamedTuple):
-    """An accepted point: its residual, the simplified correction there, that correction's size, the damping used."""
+    """An accepted point: its residual, the simplified correction there and its size.
+
+    contraction: ratio of that size to the one before; infinite after a damped step, which tells nothing of the next.
+    """
 
     x: Array
     residual: Array
     correction: Array
     size: float
-    damping: float
+    contraction: float
+
+    @property
+    def error_left(self) -> float:
+        """Estimated size of all corrections after the simplified one, were they to shrink as it did."""
+        return self.contraction / (1.0 - self.contraction) * self.size if self.contraction < 1.0 else np.inf
 
 
 def _damped_step(
@@ -145,6 +159,7 @@ def _damped_step(
             correction = -linearisation.solve(residual)
             correction_size = problem.norm(correction, x)
             if correction_size <= (1.0 - 0.25 * damping) * size:
-                return _Trial(trial, residual, correction, correction_size, damping)
+                contraction = correction_size / size if damping == 1.0 else np.inf
+                return _Trial(trial, residual, correction, correction_size, contraction)
         damping *= 0.5
     return None

@@ -1,12 +1,12 @@
 """The equations of an AbstractSystem and their derivatives at a tile of points and at both ends, compiled once per system.
 
 Meshes differ in their numbers of points; compiled functions see tiles of fixed sizes only, so that no mesh ever waits for
-the compiler. A point is a row v = (slope, algebraic, field, scalars), the ends are one vector (y(0), y(1), scalars).
+the compiler. Tiles come as flat vectors (layout.py). A point's row is v = (slope, algebraic, field).
 """
 
 from collections.abc import Callable
 from functools import cache, partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -17,139 +17,183 @@ from shapespace.numerics.system import AbstractSystem
 Density = Callable[..., dict[str, Traced]]
 """Named densities of (system, dy, y, a, s, dq, p) at one point."""
 
-TILES = (80, 160)
+TILES = (80, 160, 240)
 """Numbers of points per tile: padding costs little on small meshes, and large ones take several tiles."""
+CALL = 50
+"""Calling a compiled function costs about as much as this many points."""
+
+
+def points_per_tile(points: int) -> int:
+    """The tile that serves so many points at least cost."""
+    return min(TILES, key=lambda size: -(-points // size) * (size + CALL))
+
+
+@cache
+def stored_quantities(system: AbstractSystem) -> int:
+    """n_q."""
+    n, n_s = len(system.fields), len(system.scalars)
+    shape = jax.eval_shape(system.stored, jnp.zeros(n), jnp.zeros(n_s)).shape
+    return int(shape[0])
 
 
 class Tile(NamedTuple):
-    """Where to evaluate. rows (T, 2n + n_a + n_s), history (T, n_q), u (T,); ends (2n + n_s,), end_history (2, n_q).
+    """Where to evaluate. rows (2n + n_a, T), history (n_q, T), u (T,), scalars (n_s,); ends (2, n), end_history (2, n_q)."""
 
-    Arrays of the host or of the compiler.
-    """
-
-    rows: Any
-    history: Any
-    u: Any
-    ends: Any
-    end_history: Any
+    rows: Traced
+    history: Traced
+    u: Traced
+    scalars: Traced
+    ends: Traced
+    end_history: Traced
+    coefficient: Traced
+    p: Traced
 
 
 class Values(NamedTuple):
-    """rows (T, m + n_i): equations, then integrands; ends (n_b,): end conditions; targets (n_i,)."""
+    """rows (m + n_i, T): equations, then integrands; ends (n_b,): end conditions; targets (n_i,)."""
 
     rows: Traced
     ends: Traced
     targets: Traced
 
+    def flat(self) -> Traced:
+        """All in one."""
+        return jnp.concatenate([self.rows.ravel(), self.ends, self.targets])
 
-def _split_row(system: AbstractSystem, v: Traced) -> tuple[Traced, Traced, Traced, Traced]:
-    """(slope, algebraic, field, scalars) of one point."""
+
+def _opened(system: AbstractSystem, packed: Traced) -> Tile:
+    """The tile of a flat vector, as layout.lay_out packs it."""
+    n, n_s, n_q = len(system.fields), len(system.scalars), stored_quantities(system)
+    columns, beside = 2 * n + len(system.algebraic), n_s + 2 * n + 2 * n_q + 1 + len(system.parameters)
+    size = (packed.shape[0] - beside) // (columns + n_q + 1)
+    lengths = (columns * size, n_q * size, size, n_s, 2 * n, 2 * n_q, 1)
+    cuts = [sum(lengths[: i + 1]) for i in range(len(lengths))]
+    rows, history, u, scalars, ends, end_history, coefficient, p = jnp.split(packed, cuts)
+    rows, history = rows.reshape(columns, size), history.reshape(n_q, size)
+    return Tile(rows, history, u, scalars, ends.reshape(2, n), end_history.reshape(2, n_q), coefficient[0], p)
+
+
+def _split_row(system: AbstractSystem, v: Traced) -> tuple[Traced, Traced, Traced]:
+    """(slope, algebraic, field) of one point."""
     n, n_a = len(system.fields), len(system.algebraic)
-    return v[:n], v[n : n + n_a], v[n + n_a : 2 * n + n_a], v[2 * n + n_a :]
+    return v[:n], v[n : n + n_a], v[n + n_a :]
 
 
-def _split_ends(system: AbstractSystem, v: Traced) -> tuple[Traced, Traced, Traced]:
-    """(y(0), y(1), scalars)."""
-    n = len(system.fields)
-    return v[:n], v[n : 2 * n], v[2 * n :]
-
-
-def _at_point(system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, u: Traced, p: Traced) -> Traced:
-    """Equations and integrands at one point as a function of its row v."""
-    dy, a, y, s = _split_row(system, v)
+def _at_point(
+    system: AbstractSystem, v: Traced, s: Traced, history: Traced, coefficient: Traced, u: Traced, p: Traced
+) -> Traced:
+    """Equations and integrands at one point as a function of its row v and the scalars s."""
+    dy, a, y = _split_row(system, v)
     dq = coefficient * system.stored(y, s) + history
     return jnp.concatenate([system.equations(dy, y, a, s, dq, u, p), system.integrands(dy, y, a, s, u, p)])
 
 
-def _at_ends(system: AbstractSystem, v: Traced, history: Traced, coefficient: Traced, p: Traced) -> Traced:
+def _at_ends(system: AbstractSystem, ends: Traced, s: Traced, tile: Tile) -> Traced:
     """End conditions."""
-    y0, y1, s = _split_ends(system, v)
-    dq0, dq1 = (coefficient * system.stored(y, s) + q for y, q in ((y0, history[0]), (y1, history[1])))
-    return system.end_conditions(y0, y1, s, dq0, dq1, p)
+    dq0, dq1 = (tile.coefficient * system.stored(ends[i], s) + tile.end_history[i] for i in (0, 1))
+    return system.end_conditions(ends[0], ends[1], s, dq0, dq1, tile.p)
 
 
-def _stored(system: AbstractSystem, rows: Traced, ends: Traced) -> tuple[Traced, Traced]:
-    """q at the points (T, n_q) and at both ends (2, n_q)."""
-
-    def at(v: Traced) -> Traced:
-        _, _, y, s = _split_row(system, v)
-        return system.stored(y, s)
-
-    y0, y1, s = _split_ends(system, ends)
-    return jax.vmap(at)(rows), jnp.stack([system.stored(y0, s), system.stored(y1, s)])
+def _stored_at(system: AbstractSystem, rows: Traced, scalars: Traced, ends: Traced) -> tuple[Traced, Traced]:
+    """q at the points (n_q, T) and at both ends (2, n_q)."""
+    inner = jax.vmap(lambda v: system.stored(_split_row(system, v)[2], scalars), in_axes=-1, out_axes=-1)(rows)
+    return inner, jnp.stack([system.stored(ends[i], scalars) for i in (0, 1)])
 
 
-def _values(system: AbstractSystem, tile: Tile, coefficient: Traced, p: Traced) -> Values:
-    rows = jax.vmap(lambda v, q, u: _at_point(system, v, q, coefficient, u, p))(tile.rows, tile.history, tile.u)
-    ends = _at_ends(system, tile.ends, tile.end_history, coefficient, p)
-    return Values(rows, ends, system.targets(_split_ends(system, tile.ends)[2], p))
+def _values_at(system: AbstractSystem, tile: Tile) -> Values:
+    def at(v: Traced, q: Traced, u: Traced) -> Traced:
+        return _at_point(system, v, tile.scalars, q, tile.coefficient, u, tile.p)
+
+    rows = jax.vmap(at, in_axes=-1, out_axes=-1)(tile.rows, tile.history, tile.u)
+    return Values(rows, _at_ends(system, tile.ends, tile.scalars, tile), system.targets(tile.scalars, tile.p))
 
 
-def _linearised(system: AbstractSystem, tile: Tile, coefficient: Traced, p: Traced) -> tuple[Values, Values]:
-    """Values, and their Jacobians over the row, the ends, the scalars: rows (m + n_i, columns, T), ends, targets."""
+def _values(system: AbstractSystem, packed: Traced) -> Traced:
+    return _values_at(system, _opened(system, packed)).flat()
+
+
+def _stored(system: AbstractSystem, packed: Traced) -> tuple[Traced, Traced]:
+    tile = _opened(system, packed)
+    return _stored_at(system, tile.rows, tile.scalars, tile.ends)
+
+
+def _linearised(system: AbstractSystem, packed: Traced) -> tuple[Traced, Values]:
+    """Flat values, and their Jacobians: rows (m + n_i, columns, T), over row and scalars; ends over both ends and scalars."""
+    tile = _opened(system, packed)
+    columns, n = len(tile.rows), len(system.fields)
 
     def at(v: Traced, q: Traced, u: Traced) -> tuple[Traced, Traced]:
-        value = _at_point(system, v, q, coefficient, u, p)
+        value = _at_point(system, v[:columns], v[columns:], q, tile.coefficient, u, tile.p)
+        return value, value
+
+    def at_ends(v: Traced) -> tuple[Traced, Traced]:
+        value = _at_ends(system, v[: 2 * n].reshape(2, n), v[2 * n :], tile)
         return value, value
 
     # Points run along the last axis, which is what the elimination vectorises over.
-    slopes, rows = jax.vmap(jax.jacfwd(at, has_aux=True), out_axes=(-1, 0))(tile.rows, tile.history, tile.u)
-    ends = jax.jacfwd(lambda v: _at_ends(system, v, tile.end_history, coefficient, p))(tile.ends)
-    scalars = _split_ends(system, tile.ends)[2]
-    values = Values(rows, _at_ends(system, tile.ends, tile.end_history, coefficient, p), system.targets(scalars, p))
-    return values, Values(slopes, ends, jax.jacfwd(lambda s: system.targets(s, p))(scalars))
+    scalars = jnp.broadcast_to(tile.scalars[:, None], (len(tile.scalars), tile.u.shape[0]))
+    wide = jnp.concatenate([tile.rows, scalars])
+    slopes, rows = jax.vmap(jax.jacfwd(at, has_aux=True), in_axes=-1, out_axes=-1)(wide, tile.history, tile.u)
+    end_slopes, ends = jax.jacfwd(at_ends, has_aux=True)(jnp.concatenate([tile.ends.ravel(), tile.scalars]))
+    target_slopes = jax.jacfwd(lambda s: system.targets(s, tile.p))(tile.scalars)
+    values = Values(rows, ends, system.targets(tile.scalars, tile.p))
+    return values.flat(), Values(slopes, end_slopes, target_slopes)
 
 
-def _at_rest(system: AbstractSystem, u: Traced, rows: Traced, ends: Traced, p: Traced) -> Values:
-    history, end_history = (jnp.zeros_like(q) for q in _stored(system, rows, ends))
-    return _values(system, Tile(rows, history, u, ends, end_history), jnp.zeros(()), p)
+def _change(system: AbstractSystem, packed: Traced) -> Tile:
+    """The tile of a change of the state and the parameters, where points stay."""
+    tile = _opened(system, packed)
+    return tile._replace(u=jnp.zeros_like(tile.u))
 
 
-Increment = tuple[Traced, Traced, Traced]
-"""(rows, ends, p)."""
+def _derivative(system: AbstractSystem, at: Tile, along: Tile) -> Traced:
+    """The derivative of the values."""
+    return jax.jvp(lambda tile: _values_at(system, tile).flat(), (at,), (along,))[1]
 
 
-def _derivative(system: AbstractSystem, u: Traced, at: Increment, along: Increment) -> Values:
-    """The derivative of the values at rest."""
-    return jax.jvp(partial(_at_rest, system, u), at, along)[1]
+def _first_derivative(system: AbstractSystem, at: Traced, along: Traced) -> Traced:
+    return _derivative(system, _opened(system, at), _change(system, along))
 
 
-def _second_derivative(system: AbstractSystem, u: Traced, at: Increment, one: Increment, other: Increment) -> Values:
-    """The second derivative of the values at rest."""
-    return jax.jvp(lambda *at: _derivative(system, u, at, one), at, other)[1]
+def _second_derivative(system: AbstractSystem, at: Traced, one: Traced, other: Traced) -> Traced:
+    """The second derivative of the values."""
+    along = _change(system, one)
+    return jax.jvp(lambda at: _derivative(system, at, along), (_opened(system, at),), (_change(system, other),))[1]
 
 
-def _mass(system: AbstractSystem, u: Traced, at: Increment, rows: Traced, ends: Traced) -> Values:
-    """d(values)/d(dq/dt) dq at rest, dq being the change of q along (rows, ends)."""
-    q, dq = jax.jvp(partial(_stored, system), at[:2], (rows, ends))
+def _mass(system: AbstractSystem, at: Traced, along: Traced) -> Traced:
+    """d(values)/d(dq/dt) dq, dq being the change of q."""
+    tile, change = _opened(system, at), _change(system, along)
+    where = (tile.rows, tile.scalars, tile.ends)
+    _, (dq, dq_ends) = jax.jvp(partial(_stored_at, system), where, (change.rows, change.scalars, change.ends))
+    still = jax.tree.map(jnp.zeros_like, tile)
+    return _derivative(system, tile, still._replace(history=dq, end_history=dq_ends))
 
-    def moving(history: Traced, end_history: Traced) -> Values:
-        return _values(system, Tile(at[0], history, u, at[1], end_history), jnp.zeros(()), at[2])
 
-    return jax.jvp(moving, (jnp.zeros_like(q[0]), jnp.zeros_like(q[1])), dq)[1]
-
-
-def _densities(
-    system: AbstractSystem, density: Density, rows: Traced, history: Traced, coefficient: Traced, p: Traced
-) -> dict[str, Traced]:
+def _densities(system: AbstractSystem, density: Density, packed: Traced) -> dict[str, Traced]:
     """Named densities (T,)."""
+    tile = _opened(system, packed)
 
     def at(v: Traced, q: Traced) -> dict[str, Traced]:
-        dy, a, y, s = _split_row(system, v)
-        return density(system, dy, y, a, s, coefficient * system.stored(y, s) + q, p)
+        dy, a, y = _split_row(system, v)
+        s = tile.scalars
+        return density(system, dy, y, a, s, tile.coefficient * system.stored(y, s) + q, tile.p)
 
-    return jax.vmap(at)(rows, history)
+    return jax.vmap(at, in_axes=-1)(tile.rows, tile.history)
 
 
 class Functions(NamedTuple):
-    """The functions above, compiled for one system; they compile again for each of the TILES."""
+    """The functions above, compiled for one system; they compile again for each of the TILES.
 
-    values: Callable[..., Values]
-    linearised: Callable[..., tuple[Values, Values]]
+    Derivatives take tiles of the state and of its changes.
+    """
+
+    values: Callable[..., Traced]
+    linearised: Callable[..., tuple[Traced, Values]]
     stored: Callable[..., tuple[Traced, Traced]]
-    derivative: Callable[..., Values]
-    second_derivative: Callable[..., Values]
-    mass: Callable[..., Values]
+    derivative: Callable[..., Traced]
+    second_derivative: Callable[..., Traced]
+    mass: Callable[..., Traced]
     densities: Callable[..., dict[str, Traced]]
 
 
@@ -160,7 +204,7 @@ def compiled_functions(system: AbstractSystem) -> Functions:
         values=jax.jit(partial(_values, system)),
         linearised=jax.jit(partial(_linearised, system)),
         stored=jax.jit(partial(_stored, system)),
-        derivative=jax.jit(partial(_derivative, system)),
+        derivative=jax.jit(partial(_first_derivative, system)),
         second_derivative=jax.jit(partial(_second_derivative, system)),
         mass=jax.jit(partial(_mass, system)),
         densities=jax.jit(partial(_densities, system), static_argnums=0),
