@@ -177,7 +177,7 @@ def test_row_9_the_elastic_ring():
 
     Where sides touch nothing is transmitted across the ring but k^2/2 - s at the contact, with k = -1 and s = 1/2 there.
     """
-    problem = ring(80)
+    problem = ring(120)
     _, located = branch_from(problem, circle(problem, 0.5), [0.5], 0, 16.0, first=0.1)
     check(located, [(Kind.PITCHFORK, n**2 - 1.0) for n in (2, 3, 4)])
     touching = 5.24688696

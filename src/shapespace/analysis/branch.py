@@ -16,6 +16,8 @@ TANGENT_ERROR = 1e-4
 """Last correction of a tangent found with factors from nearby, in the norm of the problem; predictions need no better."""
 MAX_CORRECTIONS = 4
 """Of such a tangent; new factors cost as much."""
+NEARBY = 0.1
+"""Factors stand for the Jacobian at a point where they reduce the error of any solution at least this much."""
 
 
 @dataclass(frozen=True)
@@ -23,8 +25,8 @@ class Point:
     """A state of a branch in parameter `index`, on its own discretisation.
 
     p (n_p,): all parameters. tangent (n + 1,): (dx, dp[index]) per arclength, of unit length in the `metric`. arclength:
-    from the start. step: the next one to try. sign: of the determinant of [[F_x, F_p], [tangent]], comparable between
-    states of equal size, at a state within the error of prediction; NaN where it is unknown. label: why the branch stopped here, if it did.
+    from the start. step: the next one to try. test: of `Direction`, comparable between states of equal size; NaN where it
+    is unknown. label: why the branch stopped here, if it did.
     """
 
     problem: AbstractContinuableProblem
@@ -34,7 +36,7 @@ class Point:
     tangent: Array
     arclength: float = 0.0
     step: float = 0.0
-    sign: float = float("nan")
+    test: float = float("nan")
     iterations: int = 0
     jacobians: int = 0
     label: str = ""
@@ -51,15 +53,15 @@ class Point:
 
     def reversed(self) -> "Point":
         """The same point on the way back."""
-        return replace(self, tangent=-self.tangent, sign=-self.sign)
+        return replace(self, tangent=-self.tangent, test=-self.test)
 
     def on(self, problem: AbstractContinuableProblem) -> "Point":
         """The same point on another discretisation, as exact as interpolation leaves it."""
         if problem is self.problem:
             return self
         x, dx = (self.problem.carried(part, problem) for part in (self.x, self.tangent[:-1]))
-        sign = self.sign if len(x) == len(self.x) else float("nan")
-        return replace(self, problem=problem, x=x, tangent=np.append(dx, self.tangent[-1]), sign=sign)
+        test = self.test if len(x) == len(self.x) else float("nan")
+        return replace(self, problem=problem, x=x, tangent=np.append(dx, self.tangent[-1]), test=test)
 
 
 def metric(problem: AbstractContinuableProblem, X: Array, parameter_scale: float = 0.0) -> Array:
@@ -79,10 +81,14 @@ def orthogonal_plane(point: Point, row: Array, through: Array) -> ExtendedProble
 
 
 class Direction(NamedTuple):
-    """A tangent (n + 1,), not yet of unit length, and the factorised Jacobian bordered by the row of a plane that gave it."""
+    """A tangent (n + 1,), not yet of unit length, and the test function there.
+
+    test: |1/(l . A^-1 g)| with the sign of det A for the bordered Jacobian A and fixed generic l, g (n + 1,). It crosses zero
+    where the determinant does, smoothly along a branch, and is of moderate size.
+    """
 
     tangent: Array
-    linearisation: AbstractLinearisation
+    test: float
 
 
 def direction_at(
@@ -90,32 +96,48 @@ def direction_at(
 ) -> Direction | None:
     """The tangent at X across a plane, row . tangent = 1; None where the bordered Jacobian is singular.
 
-    nearby: its factors where X was predicted. The tangent is found by iteration with them where that converges.
+    nearby: factors of it at a state nearby. Where they are near enough to leave the sign of the determinant in no doubt, the
+    tangent is found by iteration with them, which is cheaper than new factors.
     """
-    unit = np.zeros_like(X)
-    unit[-1] = 1.0
     if nearby is not None:
-        tangent, last = nearby.solve(unit), np.inf
-        for _ in range(MAX_CORRECTIONS):
-            correction = nearby.solve(plane.derivative(X, p, tangent) - unit)
-            tangent, size = tangent - correction, plane.norm(correction, X)
-            if size <= TANGENT_ERROR:
-                return Direction(tangent, nearby)
-            if size > 0.5 * last:
-                break
-            last = size
+        found = _direction_nearby(plane, X, p, nearby)
+        if found is not None:
+            return found
     _, linearisation = plane.linearise(X, p, rate)
     if linearisation.is_singular:
         return None
-    return Direction(linearisation.solve(unit), linearisation)
+    response = linearisation.solve(_generic(len(X), 0))
+    return Direction(linearisation.solve(_last_unit(X)), _test(linearisation, response))
 
 
-def singularity(linearisation: AbstractLinearisation, size: int) -> float:
-    """1/(l . A^-1 g) of a factorised A (size, size) for fixed generic l, g: it crosses zero with the determinant of A.
+def _direction_nearby(plane: ExtendedProblem, X: Array, p: Array, nearby: AbstractLinearisation) -> Direction | None:
+    """The direction by iteration with factors A0 from nearby; None where they are too far for it.
 
-    Smooth along a branch on one discretisation, and of moderate size unlike the determinant.
+    They are near where A0^-1 A v is v but for a small part, for a v = A0^-1 g in which directions that A0 almost annuls stand
+    out: the determinants of A0 and A can differ in sign only where A0^-1 A has a negative eigenvalue.
     """
-    return float(1.0 / (_generic(size, 1) @ linearisation.solve(_generic(size, 0))))
+    generic = nearby.solve(_generic(len(X), 0))
+    missing = generic - nearby.solve(plane.derivative(X, p, generic))
+    if not plane.norm(missing, X) <= NEARBY * plane.norm(generic, X):
+        return None
+    tangent = nearby.solve(_last_unit(X))
+    for _ in range(MAX_CORRECTIONS):
+        correction = nearby.solve(plane.derivative(X, p, tangent) - _last_unit(X))
+        tangent = tangent - correction
+        if plane.norm(correction, X) <= TANGENT_ERROR:
+            return Direction(tangent, _test(nearby, generic + missing))
+    return None
+
+
+def _test(linearisation: AbstractLinearisation, response: Array) -> float:
+    """The test function from the sign of A and A^-1 g."""
+    return linearisation.sign / abs(float(_generic(len(response), 1) @ response))
+
+
+def _last_unit(X: Array) -> Array:
+    unit = np.zeros_like(X)
+    unit[-1] = 1.0
+    return unit
 
 
 @cache
@@ -163,7 +185,7 @@ def brackets(before: Point, after: Point) -> list[Bracket]:
     found = []
     if before.tangent[-1] * after.tangent[-1] < 0.0:
         found.append(Bracket("fold", before, after))
-    if sign_on(before, after.problem) * after.sign < 0.0:
+    if test_on(before, after.problem) * after.test < 0.0:
         found.append(Bracket("branch-point", before, after))
     return found
 
@@ -173,17 +195,12 @@ def all_brackets(points: Sequence[Point]) -> list[Bracket]:
     return [bracket for pair in pairwise(points) for bracket in brackets(*pair)]
 
 
-def direction_of(point: Point, parameter_scale: float = 0.0) -> Direction | None:
-    """The direction at a point, across the plane orthogonal to the tangent that it has."""
-    X = point.joined
-    plane = orthogonal_plane(point, metric(point.problem, X, parameter_scale) * point.tangent, X)
-    return direction_at(plane, X, point.p, Rate.of_growth(point.problem.stored(point.x, point.p)))
-
-
-def sign_on(point: Point, problem: AbstractContinuableProblem) -> float:
-    """The sign of a point, comparable with that of states on another discretisation; NaN where it is unknown."""
+def test_on(point: Point, problem: AbstractContinuableProblem) -> float:
+    """The test function of a point, comparable with that of states on another discretisation; NaN where it is unknown."""
     there = point.on(problem)
-    if not np.isnan(there.sign):
-        return there.sign
-    direction = direction_of(there)
-    return float("nan") if direction is None else direction.linearisation.sign
+    if not np.isnan(there.test):
+        return there.test
+    X = there.joined
+    plane = orthogonal_plane(there, metric(problem, X) * there.tangent, X)
+    direction = direction_at(plane, X, there.p, Rate.of_growth(problem.stored(there.x, there.p)))
+    return float("nan") if direction is None else direction.test

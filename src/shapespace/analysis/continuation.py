@@ -16,14 +16,13 @@ from shapespace.analysis.branch import (
     metric,
     orthogonal_plane,
     real_roots,
-    sign_on,
-    singularity,
+    test_on,
 )
 from shapespace.analysis.extended import AbstractMeasure, ExtendedProblem, Given, Parameter
 from shapespace.analysis.stationary import STEP_NEWTON
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractContinuableProblem, AbstractLinearisation, Rate
+from shapespace.base.problem import AbstractContinuableProblem, Rate
 from shapespace.numerics.newton import Newton, solve_root
 
 MEMORY = 4
@@ -104,7 +103,7 @@ def start_point(
             turned = tangent is None and unit[-1] * direction < 0.0
             unit = -unit if turned else unit
             again = direction_at(orthogonal_plane(point, weights * unit, X), X, p, rate)
-            return replace(point, tangent=unit, sign=float("nan") if again is None else again.linearisation.sign)
+            return replace(point, tangent=unit, test=float("nan") if again is None else again.test)
     if tangent is None:
         return Outcome.SINGULAR
     return replace(point, tangent=tangent / np.sqrt(weights @ tangent**2))
@@ -155,7 +154,7 @@ class Continuation:
         problem = past[-1].problem.adapted(past[-1].x)
         assert isinstance(problem, AbstractContinuableProblem)
         places = [point.on(problem) for point in past]
-        places[-1] = replace(places[-1], sign=sign_on(places[-1], problem))
+        places[-1] = replace(places[-1], test=test_on(places[-1], problem))
         trial = _Trial(places, self.options, self.newton)
         step = past[-1].step
         while step >= self.options.smallest:
@@ -188,6 +187,7 @@ class _Trial:
     def __init__(self, places: Sequence[Point], options: Arclength, newton: Newton) -> None:
         self.places, self.now, self.options, self.newton = places, places[-1], options, newton
         self.crossed: _Crossed | None = None
+        self.beyond: list[tuple[float, float]] = []
         self.X = self.now.joined
         self.metric = metric(self.now.problem, self.X, options.parameter_scale)
         self.row = self.metric * self.now.tangent
@@ -222,8 +222,10 @@ class _Trial:
         turn = float(np.arccos(np.minimum(self.row @ point.tangent / lengths, 1.0))) / options.turn
         if not turn <= 1.0 or _hides_folds(self.now, point):
             return None
-        if step > options.crossing and self.now.sign * point.sign < 0.0:
-            return self._crossed(step, found.linearisation)
+        if step > options.crossing and self.now.test * point.test < 0.0:
+            return self._crossed(step, point)
+        if step > options.crossing and self._hides_branch_points(step, point):
+            return None
         factor = min(0.9 * max(error, 1e-12) ** (-1.0 / order), 0.5 / max(turn, 1e-12))
         if root.jacobians > 2:
             factor = min(factor, 0.7)
@@ -239,17 +241,24 @@ class _Trial:
         """Largest distance of neighbours among the places."""
         return max((b.arclength - a.arclength for a, b in pairwise(self.places)), default=0.0)
 
-    def _crossed(self, step: float, there: AbstractLinearisation) -> _Crossed | None:
-        """Where the branch point lies that a step has crossed; None where its ends do not tell."""
-        here = direction_at(orthogonal_plane(self.now, self.row, self.X), self.X, self.now.p, self.rate)
-        if here is None:
-            return None
-        start, end = (singularity(one, len(self.X)) for one in (here.linearisation, there))
-        if not start * end < 0.0:
-            return None
-        at = step * start / (start - end)
+    def _crossed(self, step: float, end: Point) -> _Crossed:
+        """Where the branch point lies that a step has crossed: by the parabola through the last two such steps."""
+        self.beyond = [*self.beyond, (step, end.test)][-2:]
+        lengths, values = np.array([(0.0, self.now.test), *self.beyond]).T
+        course = np.linalg.solve(np.vander(lengths / step, increasing=True), values / self.now.test)
+        at = step * float(real_roots(course, 0.0, 1.0)[0])
         self.crossed = _Crossed(at, max(at - 0.4 * self.options.crossing, self.options.crossing, 0.05 * step))
         return self.crossed
+
+    def _hides_branch_points(self, step: float, end: Point) -> bool:
+        """Whether the test function, as a parabola through the last place, this point and the end, dips below zero between."""
+        if len(self.places) < 2 or not self.places[-2].test * self.now.test > 0.0:
+            return False
+        back = self.places[-2].arclength - self.now.arclength
+        values = np.array([self.places[-2].test, self.now.test, end.test]) / self.now.test
+        c, b, a = np.linalg.solve(np.vander([back, 0.0, step], increasing=True), values)
+        dip = -b / (2.0 * a) if a > 0.0 else 0.0
+        return 0.0 < dip < step and c + dip * (b + dip * a) < 0.0
 
     def stop(self, end: Point, s: float, stop: Stop) -> Point | None:
         """The exact point of a stop near arclength s on the way to an end; None where Newton fails or ends far off."""
@@ -278,8 +287,8 @@ class _Trial:
         chord = (X - self.X) ** 2
         length = 0.5 * (np.sqrt(self.metric @ chord) + np.sqrt(there @ chord))
         unit = found.tangent / np.sqrt(there @ found.tangent**2)
-        arclength, sign = self.now.arclength + float(length), found.linearisation.sign
-        return Point(self.now.problem, x, p, self.now.index, unit, arclength, sign=sign)
+        arclength = self.now.arclength + float(length)
+        return Point(self.now.problem, x, p, self.now.index, unit, arclength, test=found.test)
 
 
 def _hides_folds(start: Point, end: Point) -> bool:

@@ -16,7 +16,7 @@ class BranchPoint:
     """A point of a branch in one key of its scenario.
 
     frame: the state, at time zero, with its observables. parameter: the key's value, with the estimated error of a located
-    one. arclength: from the start, in the branch's own metric; step: the next one to try; sign: of the bordered determinant.
+    one. arclength: from the start, in the branch's own metric; step: the next one to try; test: function of branch points.
     leg: 0 on the way to the stop, 1 on the way back. tangent (n + 1,); directions (2, n + 1): of both branches through a
     branch point, else (0, n + 1). growth_rates (m, 2): real and imaginary parts, leading first, in the scenario's units, with
     errors (m,), parities and names of neutral ones by place; modes (m, n), of labelled points only. n_unstable: None where
@@ -30,7 +30,7 @@ class BranchPoint:
     parameter: float
     arclength: float
     step: float
-    sign: float
+    test: float
     tangent: Array
     growth_rates: Array
     growth_rate_errors: Array
@@ -70,7 +70,7 @@ class BranchPoint:
 
 _LAYOUT = Layout(
     block="branch",
-    numbers=("parameter", "parameter_error", "arclength", "step", "sign", "next_shift"),
+    numbers=("parameter", "parameter_error", "arclength", "step", "test", "next_shift"),
     arrays=("tangent", "directions", "growth_rates", "growth_rate_errors", "modes"),
     words=(
         "parities", "neutral", "n_unstable", "n_unstable_before", "n_unstable_after", "leg", "label", "kind", "is_step", "ends",

@@ -367,7 +367,7 @@ def _point(problem: KeyedProblem | HeldProblem, point: BranchPoint) -> Point:
         point.tangent,
         point.arclength,
         point.step,
-        point.sign,
+        point.test,
         label=point.label,
     )
 

@@ -228,7 +228,7 @@ class Surveyor:
             parameter=point.parameter,
             arclength=point.arclength,
             step=point.step,
-            sign=point.sign,
+            test=point.test,
             tangent=point.tangent,
             leg=self._leg,
             **known,
