@@ -172,7 +172,7 @@ CHAFEE_INFANTE = SecondOrder(lambda x, y, p: p[0] * (y - y**3), ("lam",), length
 
 
 def _on_uniform_mesh(system: AbstractSystem, elements: int, degree: int, integrals: int = 0) -> CollocationProblem:
-    return CollocationProblem(system, uniform_mesh(elements), degree, integrals, 1e-8)
+    return CollocationProblem(system, uniform_mesh(elements), degree, 1e-8)
 
 
 def bratu(elements: int = 20, degree: int = 4) -> CollocationProblem:

@@ -27,7 +27,7 @@ def make_engine(name: str, **overrides: object) -> Engine:
     """The engine of a built-in scenario on a mesh that stays, 20 elements of 4 points unless told otherwise."""
     engine = Engine.of(scenario(name, **{"elements": 20, "degree": 4, **overrides}))
     made = engine.problem
-    return replace(engine, problem=FixedMesh(made.system, made.mesh, made.degree, made.n_integrals, made.tolerance))
+    return replace(engine, problem=FixedMesh(made.system, made.mesh, made.degree, made.tolerance))
 
 
 def start_of(engine: Engine, state: State | None = None) -> Moment:

@@ -81,7 +81,7 @@ def test_a_curve_of_pitchforks():
     system = SecondOrder(
         lambda x, y, p: p[0] * (p[1] * y - y**3) + 0.0 * jnp.sin(x), ("lam", "a"), length=float(np.pi), mirror=mirror
     )
-    problem = CollocationProblem(system, uniform_mesh(20), 4, 0, 1e-8)
+    problem = CollocationProblem(system, uniform_mesh(20), 4, 1e-8)
     x = at_rest(problem)
     point = locate_branch_point(problem, 0, x, np.array([1.02, 1.0]), np.append(x, 1.02))
     assert isinstance(point, SingularPoint)

@@ -64,7 +64,7 @@ def exact_parameters() -> Array:
 
 def solve_everything(mesh: Array, degree: int, newton: Newton = Newton(1e-12)) -> tuple[CollocationProblem, Root]:
     """`Everything` on a mesh, from a guess 5 % off; dq/dt = -2 q + cos(u), known at the Gauss points."""
-    problem = CollocationProblem(Everything(), mesh, degree, 1)
+    problem = CollocationProblem(Everything(), mesh, degree)
     shape = State(mesh, np.zeros((len(mesh), 2)), np.zeros((len(mesh) - 1, degree, 2)), np.zeros(0), np.zeros(0))
     stages = shape.stage_points
     nodal, inner = exact(mesh), exact(stages)
@@ -142,7 +142,7 @@ def solve_layer(
     system: BoundaryLayer | InteriorLayer, mesh: Array, degree: int, e: float, tolerance: float
 ) -> tuple[CollocationProblem, Array]:
     """A layer of thickness e on a mesh; the problem is linear, so that one correction from nothing solves it."""
-    problem = CollocationProblem(system, mesh, degree, 0, tolerance)
+    problem = CollocationProblem(system, mesh, degree, tolerance)
     elements, p = len(mesh) - 1, np.array([e])
     nothing = np.zeros(2 * (elements + 1) + 2 * elements * degree)
     residual, linearisation = problem.linearise(nothing, p, Rate(0.0, np.zeros(elements * degree + 2)))

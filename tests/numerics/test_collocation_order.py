@@ -85,7 +85,7 @@ def sphere_with_ring(u: Array, width: float) -> Array:
 def after_one_step(elements: int, degree: int) -> State:
     """Guided division one backward Euler step after a lopsided ring: a strong flow towards and away from both poles."""
     engine = Engine.of(scenario("guided-division", elements=20, degree=degree, **RING))
-    problem = CollocationProblem(engine.system, uniform_mesh(elements), degree, 1)
+    problem = CollocationProblem(engine.system, uniform_mesh(elements), degree)
     guess = Engine(problem, engine.p, engine.values).initial_state()
     before = sphere_with_ring(np.append(guess.stage_points.ravel(), [0.0, 1.0]), engine.values["ring_width"])
     rate = Rate(1.0 / STEP, -before.ravel() / STEP)

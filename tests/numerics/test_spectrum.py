@@ -62,7 +62,7 @@ def linear(reaction: Callable[[Traced], Traced], n: int, elements: int = 20, deg
     """A linear problem of n rates."""
     names = tuple(f"{kind}{i}" for kind in ("y", "slope") for i in range(n))
     system = Linear(reaction, names, **kinds)
-    return CollocationProblem(system, uniform_mesh(elements), degree, len(system.scalars), 1e-8)
+    return CollocationProblem(system, uniform_mesh(elements), degree, 1e-8)
 
 
 def spectrum_at_rest(problem: CollocationProblem, p: float = 1.0, **options: int) -> Spectrum:
@@ -236,7 +236,7 @@ def test_neutral_rates_get_their_names():
     from tests.classic import SecondOrder
 
     system = SecondOrder(lambda x, y, p: p[0] * (y - y), ("unused",), neumann=(True, True))
-    problem = CollocationProblem(system, uniform_mesh(20), 4, 0, 1e-8)
+    problem = CollocationProblem(system, uniform_mesh(20), 4, 1e-8)
     x, p = at_rest(problem), np.array([1.0])
     one = start_from(problem, lambda u: np.stack([0 * u + 1, 0 * u], 1), lambda u: np.stack([0 * u, 0 * u], 1))
     amount = problem.weights(x) * one

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapespace.analysis.bifurcation import LARGEST_GAP, LOCATION, SAFETY, SingularPoint, branch_directions
-from shapespace.analysis.branch import Point, direction_at, metric, orthogonal_plane, sign_on
+from shapespace.analysis.branch import Point, direction_at, metric, orthogonal_plane, test_on
 from shapespace.analysis.continuation import Arclength, Continuation, start_point
 from shapespace.analysis.passage import point_between
 from shapespace.analysis.singular import Kernel, SingularProblem, probe
@@ -248,7 +248,7 @@ def special_points(one: Readings, other: Readings) -> list[Special | NotFound]:
     """What lies between two neighbours of a curve with these readings, in its order."""
     before, after = one.point, other.point
     kinds = [kind for kind, value in one.values.items() if value * other.values[kind] < 0.0]
-    if sign_on(before, after.problem) * after.sign < 0.0:
+    if test_on(before, after.problem) * after.test < 0.0:
         mirrored = system_of(after).is_fold and _is_mirrored(after)
         kinds.append(CurveKind.FOLD_PITCHFORK if mirrored else CurveKind.BRANCH_POINT)
     found: list[tuple[float, Special | NotFound]] = []
@@ -259,7 +259,7 @@ def special_points(one: Readings, other: Readings) -> list[Special | NotFound]:
         if share is None or place is None:
             found.append((1.0, NotFound(kind, before, after)))
         elif all(abs(share - known) > TOGETHER for known, _ in found):
-            labelled = replace(place, label=str(kind), sign=float("nan"))
+            labelled = replace(place, label=str(kind), test=float("nan"))
             found.append((share, Special(kind, labelled, _errors(before, after, function, place))))
     return [one for _, one in sorted(found, key=lambda pair: pair[0])]
 

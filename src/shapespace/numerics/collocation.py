@@ -14,7 +14,7 @@ from shapespace.numerics.adaptation import adapted_mesh
 from shapespace.numerics.border import with_border
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.layout import assembled, by_element, joined, lay_out
-from shapespace.numerics.pointwise import Density, Functions, compiled_functions, points_per_tile, stored_quantities
+from shapespace.numerics.pointwise import Density, Functions, compiled_functions, numbers, points_per_tile
 from shapespace.numerics.small_lu import compiled
 from shapespace.numerics.state import State
 from shapespace.numerics.system import AbstractSystem
@@ -73,7 +73,6 @@ class CollocationProblem(AbstractSmoothProblem):
     system: AbstractSystem
     mesh: Array
     degree: int
-    n_integrals: int
     tolerance: float = 1e-6
 
     @cached_property
@@ -94,7 +93,12 @@ class CollocationProblem(AbstractSmoothProblem):
     @cached_property
     def n_stored(self) -> int:
         """Stored quantities n_q."""
-        return stored_quantities(self.system)
+        return numbers(self.system).stored
+
+    @cached_property
+    def n_integrals(self) -> int:
+        """Integral conditions n_i."""
+        return numbers(self.system).integrals
 
     @cached_property
     def _widths(self) -> Array:

@@ -28,12 +28,18 @@ def points_per_tile(points: int) -> int:
     return min(TILES, key=lambda size: -(-points // size) * (size + CALL))
 
 
+class Numbers(NamedTuple):
+    """Of stored quantities n_q and of integral conditions n_i."""
+
+    stored: int
+    integrals: int
+
+
 @cache
-def stored_quantities(system: AbstractSystem) -> int:
-    """n_q."""
-    n, n_s = len(system.fields), len(system.scalars)
-    shape = jax.eval_shape(system.stored, jnp.zeros(n), jnp.zeros(n_s)).shape
-    return int(shape[0])
+def numbers(system: AbstractSystem) -> Numbers:
+    """As the system's functions return them."""
+    y, s, p = (jnp.zeros(len(names)) for names in (system.fields, system.scalars, system.parameters))
+    return Numbers(jax.eval_shape(system.stored, y, s).shape[0], jax.eval_shape(system.targets, s, p).shape[0])
 
 
 class Tile(NamedTuple):
@@ -63,7 +69,7 @@ class Values(NamedTuple):
 
 def _opened(system: AbstractSystem, packed: Traced) -> Tile:
     """The tile of a flat vector, as layout.lay_out packs it."""
-    n, n_s, n_q = len(system.fields), len(system.scalars), stored_quantities(system)
+    n, n_s, n_q = len(system.fields), len(system.scalars), numbers(system).stored
     columns, beside = 2 * n + len(system.algebraic), n_s + 2 * n + 2 * n_q + 1 + len(system.parameters)
     size = (packed.shape[0] - beside) // (columns + n_q + 1)
     lengths = (columns * size, n_q * size, size, n_s, 2 * n, 2 * n_q, 1)

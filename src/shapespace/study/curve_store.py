@@ -33,7 +33,7 @@ class CurvePoint:
     of: str
     arclength: float
     step: float
-    sign: float
+    test: float
     tangent: Array
     kernel: Array
     across: Array
@@ -70,7 +70,7 @@ class CurvePoint:
             parameter_error=float(self.parameter_errors[0]),
             arclength=0.0,
             step=self.step,
-            sign=np.nan,
+            test=np.nan,
             tangent=self.directions[0],
             directions=self.directions if len(self.directions) == 2 else np.zeros((0, 0)),
             growth_rates=np.zeros((0, 2)),
@@ -83,7 +83,7 @@ class CurvePoint:
 
 _LAYOUT = Layout(
     block="curve",
-    numbers=("unfolding", "arclength", "step", "sign"),
+    numbers=("unfolding", "arclength", "step", "test"),
     arrays=("parameters", "parameter_errors", "tangent", "kernel", "across", "directions"),
     words=("of", "leg", "label", "kind", "is_step", "ends", "missed"),
 )

@@ -352,7 +352,7 @@ class _Recorder:
             of=self.of,
             arclength=point.arclength,
             step=point.step,
-            sign=point.sign,
+            test=point.test,
             tangent=point.tangent,
             kernel=system.kernel,
             across=system.across,
@@ -379,6 +379,6 @@ class _Recorder:
             record.tangent,
             record.arclength,
             record.step,
-            record.sign,
+            record.test,
             label=record.kind,
         )

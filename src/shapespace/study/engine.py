@@ -58,8 +58,7 @@ class Engine:
             values["initial_oblate"] = float(scenario.values()["initial_oblate"])
         p = np.array([values[name] for name in system.parameters])
         mesh = uniform_mesh(numerics.elements)
-        problem = CollocationProblem(system, mesh, numerics.degree, len(system.held), numerics.mesh_tolerance)
-        return cls(problem, p, values)
+        return cls(CollocationProblem(system, mesh, numerics.degree, numerics.mesh_tolerance), p, values)
 
     def placed(self, state: State) -> tuple[CollocationProblem, Array]:
         """The problem on a state's mesh and the state on it, resampled where it has another degree or fewer elements."""
