@@ -171,7 +171,7 @@ CARRIER = SecondOrder(_carrier, ("eps",), length=2.0, start=-1.0, mirror=REFLECT
 CHAFEE_INFANTE = SecondOrder(lambda x, y, p: p[0] * (y - y**3), ("lam",), length=float(np.pi), mirror=SIGN)
 
 
-def _on_uniform_mesh(system: AbstractSystem, elements: int, degree: int, integrals: int = 0) -> CollocationProblem:
+def _on_uniform_mesh(system: AbstractSystem, elements: int, degree: int) -> CollocationProblem:
     return CollocationProblem(system, uniform_mesh(elements), degree, 1e-8)
 
 
@@ -198,7 +198,7 @@ def neumann_bratu(elements: int = 20, degree: int = 4) -> CollocationProblem:
 
 def mean_free(elements: int = 20, degree: int = 4) -> CollocationProblem:
     """y'' + p1 e^y = 0, y(0) - y(1) = p2, int y = 0 (row 4): fold at p1 = 11.923790201 for p2 = 0 (AUTO demo `int`: 11.9238)."""
-    return _on_uniform_mesh(MeanFree(), elements, degree, 1)
+    return _on_uniform_mesh(MeanFree(), elements, degree)
 
 
 def chan(elements: int = 20, degree: int = 4) -> CollocationProblem:
@@ -223,7 +223,7 @@ def ring(elements: int = 40, degree: int = 4) -> CollocationProblem:
     """An elastic ring under the pressure p (row 9): the circle buckles at p = n^2 - 1, n = 2, 3, ...; opposite sides touch at
     p = 5.24688696 for n = 2 (Flaherty, Keller and Rubinow 1972: 5.247).
     """
-    return _on_uniform_mesh(Ring(), elements, degree, 2)
+    return _on_uniform_mesh(Ring(), elements, degree)
 
 
 def circle(problem: CollocationProblem, pressure: float) -> Array:
