@@ -67,10 +67,7 @@ def linear(reaction: Callable[[Traced], Traced], n: int, elements: int = 20, deg
 
 def spectrum_at_rest(problem: CollocationProblem, p: float = 1.0, **options: int) -> Spectrum:
     """Of the zero state."""
-    x = at_rest(problem)
-    if problem.system.scalars:
-        x = np.zeros(len(problem.pack(problem.unpack(np.append(x, np.zeros(len(problem.system.scalars)))))))
-    return solve_spectrum(problem, x, np.array([p]), Spectral(**options))
+    return solve_spectrum(problem, at_rest(problem), np.array([p]), Spectral(**options))
 
 
 def bratu_state(problem: CollocationProblem, guess: float) -> Array:
