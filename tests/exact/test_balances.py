@@ -215,7 +215,7 @@ def test_flat_disc_with_a_held_rim_in_turning_surroundings():
     """v_phi = Omega [r - R I1(r/l)/I1(R/l)], l^2 = eta_s/Gamma: azimuthal viscous stress and friction in closed form."""
     engine = make_engine("membrane-protrusion", azimuthal_flow=True, spontaneous_curvature=0.0, friction=9.0)
     moments, outcome = march(turning(engine, 0.7), 1e-2, order=1, fixed_step=1e-2, newton=TIGHT)
-    assert outcome is Outcome.REACHED_END
+    assert outcome is Outcome.STATIONARY  # the shape does not move
     f = stage_fields(engine, moments[-1].x)
     exact = 0.7 * (f["r"] - iv(1, 3.0 * f["r"]) / iv(1, 3.0))
     error = float(np.abs(f["v_phi"] - exact).max())
