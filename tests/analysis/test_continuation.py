@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import chain, pairwise
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,6 +15,7 @@ from shapespace.analysis.bifurcation import SingularPoint, locate_branch_point, 
 from shapespace.analysis.branch import Bracket, Point, all_brackets, brackets, hermite
 from shapespace.analysis.continuation import MEMORY, Arclength, Continuation, Event, Stop, start_point
 from shapespace.analysis.extended import AbstractMeasure, Parameter
+from shapespace.analysis.passage import meets_mirror_image, passed_start
 from shapespace.analysis.stationary import solve_stationary
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -312,3 +314,58 @@ def test_the_number_of_points_is_bounded():
 def test_options_are_checked(wrong: dict[str, float]):
     with pytest.raises(ValueError, match="must"):
         Arclength(**wrong)  # type: ignore[arg-type]
+
+
+def first_return(begin: Point, options: Arclength) -> float:
+    """The arclength at which a branch passes its start."""
+    points = pairwise(chain([begin], Continuation([begin], (), options)))
+    return next(found for one, other in points if (found := passed_start(begin, one, other)) is not None)
+
+
+@pytest.mark.parametrize("largest", [0.02, 0.2])
+@pytest.mark.parametrize("angle", [0.3, np.pi / 2.0, 4.0])
+def test_a_closed_branch_passes_its_start(largest: float, angle: float):
+    """x^2 + p^2 = 1, from any point of it, folds included: once round."""
+    circle = AlgebraicProblem(lambda x, p: x**2 + p[0] ** 2 - 1.0, 1)
+    x, p = np.array([np.cos(angle)]), np.array([np.sin(angle)])
+    options = Arclength(first=0.01, largest=largest, max_points=500)
+    begin = start_point(circle, x, p, 0, 1.0, options)
+    assert isinstance(begin, Point)
+    assert first_return(begin, options) == pytest.approx(2.0 * np.pi, rel=1e-2)
+
+
+def test_a_branch_that_crosses_its_start_another_way_goes_on():
+    """The figure eight x^2 = p^2 (1 - p^2) from its middle: through the middle the other way, then round to the start."""
+    eight = AlgebraicProblem(lambda x, p: x**2 - p[0] ** 2 * (1.0 - p[0] ** 2), 1)
+    diagonal = np.array([1.0, 1.0])
+    options = Arclength(first=0.01, largest=0.1, max_points=500)
+    begin = start_point(eight, np.zeros(1), np.zeros(1), 0, 1.0, options, diagonal)
+    assert isinstance(begin, Point)
+    # The arc of x = p sqrt(1 - p^2) from p = 0 to 1, four times.
+    angle = np.linspace(0.0, 0.5 * np.pi, 20001)
+    length = 4.0 * np.trapezoid(np.hypot(np.cos(angle), np.cos(2.0 * angle)), angle)
+    assert first_return(begin, options) == pytest.approx(length, rel=1e-2)
+
+
+class OddProblem(AlgebraicProblem):
+    """f(-x) = -f(x)."""
+
+    def reflected(self, x: Array, increment: bool = False) -> Array:
+        return -x
+
+
+@pytest.mark.parametrize(
+    ("x", "p", "tangent", "expected"),
+    [
+        (0.0, 1.0, [1.0, 0.0], True),  # through the second pitchfork
+        (0.0, 1.0, [0.0, 1.0], False),  # along the symmetric branch
+        (0.5, 0.5, [1.0, 0.0], False),  # between the pitchforks
+    ],
+)
+def test_a_branch_between_pitchforks_goes_on_as_its_mirror_image(
+    x: float, p: float, tangent: list[float], expected: bool
+):
+    """x' = x (p (1 - p) - x^2): the side branch is a closed curve through both pitchforks."""
+    odd = OddProblem(lambda x, p: x * (p[0] * (1.0 - p[0]) - x**2), 1)
+    point = Point(odd, np.array([x]), np.array([p]), 0, np.array(tangent))
+    assert meets_mirror_image(point) is expected

@@ -13,7 +13,6 @@ from shapespace.analysis.continuation import Arclength, Continuation, Stop
 from shapespace.analysis.curves import (
     CurveKind,
     Special,
-    closes,
     is_unfolded,
     own_parameter,
     parameters_at,
@@ -21,6 +20,7 @@ from shapespace.analysis.curves import (
     traced_curve,
 )
 from shapespace.analysis.extended import Parameter
+from shapespace.analysis.passage import passed_start
 from shapespace.base.arrays import Traced
 
 Law = Callable[[Traced, Traced], Traced]
@@ -136,7 +136,7 @@ def test_a_closed_curve():
     last, length = first, 0.0
     for point in Continuation([first], (), Arclength(first=0.05, max_points=200)):
         length = point.arclength
-        if closes(first, last, point):
+        if passed_start(first, last, point) is not None:
             break
         last = point
     assert length == pytest.approx(2.0 * np.pi, abs=0.3)

@@ -242,3 +242,18 @@ def test_killed_and_resumed_gives_the_same_points(store: Path, tmp_path: Path):
     whole, resumed = ss.open_branch(store), sphere(out=path, resume=True)
     for one, other in zip(resumed.points, whole.points, strict=True):
         assert_same(one, other)
+
+
+@pytest.mark.slow
+def test_a_branch_between_two_pitchforks_ends_at_the_second(tmp_path: Path):
+    """It would go on round the loop, through its mirror image and both pitchforks, again and again."""
+    case, path = ss.scenario("guided-division"), tmp_path / "ring"
+    found = ss.branch(case, "ring_amplitude", 3.0, start=1.7, stability=False, out=path)
+    first, second = [point for point in found.special_points if point.kind == "pitchfork"][1:3]
+    side = ss.branch(case, "ring_amplitude", 3.0, origin=f"{path}:{first.label}", side=1, stability=False)
+    assert side.outcome is Outcome.REJOINED
+    (end,) = side.special_points
+    assert side.points[-1] is end
+    assert end.kind == "pitchfork"
+    assert end.parameter == pytest.approx(second.parameter, abs=first.parameter_error + second.parameter_error)
+    assert len(side.points) < 100

@@ -21,7 +21,7 @@ import numpy as np
 from shapespace.analysis.bifurcation import LARGEST_GAP, LOCATION, SAFETY, SingularPoint, branch_directions
 from shapespace.analysis.branch import Point, direction_at, metric, orthogonal_plane, test_on
 from shapespace.analysis.continuation import Arclength, Continuation, start_point
-from shapespace.analysis.passage import point_between
+from shapespace.analysis.passage import is_symmetric, point_between
 from shapespace.analysis.singular import Kernel, SingularProblem, probe
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -33,8 +33,6 @@ BESIDE = 1e-5
 """Shares of the way by which to step aside from a point where the system is singular."""
 TOGETHER = 1e-3
 """Special points nearer to each other, relative to the step, are one."""
-MIRRORED = 1e-6
-"""A state this near to its mirror image, in the norm of the problem, is symmetric."""
 STENCIL = 3e-3
 """Of the third derivative, as a change of the state."""
 
@@ -103,20 +101,6 @@ def is_unfolded(point: Point) -> bool:
     """Whether the branches of a branch point have parted: it is none, for all that its defining system is solved."""
     system = system_of(point)
     return not system.is_fold and 2.0 * abs(point.x[-1]) > LARGEST_GAP**2 * np.abs(system.form(point.x, point.p)).max()
-
-
-def closes(start: Point, before: Point, after: Point) -> bool:
-    """Whether a curve passes its start between two later neighbours."""
-    first, last = start.on(after.problem), before.on(after.problem)
-    weights = metric(after.problem, after.joined)
-    chord, way = after.joined - last.joined, first.joined - last.joined
-    share = float((weights @ (chord * way)) / (weights @ chord**2))
-    if last.arclength == start.arclength or not 0.0 <= share <= 1.0:
-        return False
-    if weights @ (way - share * chord) ** 2 > weights @ chord**2:
-        return False
-    near = point_between(before, after, share)
-    return near is not None and bool(weights @ (near.joined - first.joined) ** 2 < 1e-4 * (weights @ chord**2))
 
 
 def branches_at(point: Point) -> tuple[Array, Array]:
@@ -249,7 +233,8 @@ def special_points(one: Readings, other: Readings) -> list[Special | NotFound]:
     before, after = one.point, other.point
     kinds = [kind for kind, value in one.values.items() if value * other.values[kind] < 0.0]
     if test_on(before, after.problem) * after.test < 0.0:
-        mirrored = system_of(after).is_fold and _is_mirrored(after)
+        system = system_of(after)
+        mirrored = system.is_fold and is_symmetric(system.base, system.state(after.x))
         kinds.append(CurveKind.FOLD_PITCHFORK if mirrored else CurveKind.BRANCH_POINT)
     found: list[tuple[float, Special | NotFound]] = []
     for kind in sorted(kinds, key=list(CurveKind).index):
@@ -310,14 +295,6 @@ def _errors(before: Point, after: Point, function: Function, place: Point) -> tu
         moved = np.nan if other is None else np.array([own_parameter(other), other.parameter]) - values
         errors = errors + SAFETY * np.abs(moved)
     return float(errors[0]), float(errors[1])
-
-
-def _is_mirrored(point: Point) -> bool:
-    """Whether the state is its own mirror image."""
-    system = system_of(point)
-    x = system.state(point.x)
-    image = system.base.reflected(x)
-    return image is not None and system.base.norm(image - x, x) < MIRRORED
 
 
 def _rest(point: Point) -> Rate:

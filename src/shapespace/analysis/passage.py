@@ -1,4 +1,4 @@
-"""What lies between two neighbouring points of a branch: any place, where something changes, and Hopf points."""
+"""What lies between two neighbouring points of a branch: any place, the start again, where something changes, Hopf points."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,13 +9,24 @@ from numpy.polynomial.polynomial import polyder, polyval
 from shapespace.analysis.bifurcation import SAFETY
 from shapespace.analysis.branch import Point, hermite, metric, orthogonal_plane
 from shapespace.analysis.stability import Spectrum
-from shapespace.base.problem import AbstractSmoothProblem, Rate
+from shapespace.base.arrays import Array
+from shapespace.base.problem import AbstractContinuableProblem, AbstractSmoothProblem, Rate
 from shapespace.numerics.newton import Newton, solve_root
 
 PLACE = Newton(tolerance=1e-10)
 BISECTIONS = 16
 """Halvings of the way between two points."""
 HOPF_STEPS = 12
+BESIDE = 1e-2
+"""A branch that passes its start no farther off than this, relative to the step, passes through it,"""
+SAME = 1e-4
+"""or than this in the metric, as states carried to another discretisation are no more exact."""
+AT_END = 1e-6
+"""Shares of a step by which a place beyond an end of it is the end."""
+ALONG = 0.9
+"""Least cosine between the tangents there: a branch may cross its start another way."""
+MIRRORED = 1e-6
+"""A state this near to its mirror image, in the norm of the problem, is symmetric."""
 ON_AXIS = 1e-9
 """A pair's real part below this, relative to its frequency, is zero: as exact as spectra are."""
 
@@ -55,6 +66,49 @@ def first_change(before: Point, after: Point, holds: Callable[[Point], bool]) ->
         else:
             low, a = place, 0.5 * (a + b)
     return low, high
+
+
+def passed_start(start: Point, before: Point, after: Point) -> float | None:
+    """The arclength at which a branch passes its start again, in the same direction, between two later neighbours, if so."""
+    last, weights = before.on(after.problem), metric(after.problem, after.joined)
+    chord = after.joined - last.joined
+    size = float(weights @ chord**2)
+    # Mostly the parameter alone tells that the start is elsewhere.
+    if last.arclength == start.arclength or weights[-1] * (start.parameter - last.parameter) ** 2 > 2.0 * size:
+        return None
+    first, length = start.on(after.problem), after.arclength - last.arclength
+    share = float(weights @ (chord * (first.joined - last.joined))) / size
+    if not -AT_END <= share <= 1.0 + AT_END:
+        return None
+    # By the cubic, as a start where branches meet is no place to solve for.
+    cubic = hermite(last.joined, last.tangent, after.joined, after.tangent, length)
+    place, along = (np.asarray(polyval(share * length, part)) for part in (cubic, polyder(cubic)))
+    along = along / np.sqrt(weights @ along**2)
+    gap = first.joined - place
+    ahead = float(weights @ (gap * along))
+    miss, cosine = np.sqrt(weights @ (gap - ahead * along) ** 2), weights @ (along * first.tangent)
+    if miss > max(BESIDE * np.sqrt(size), SAME) or cosine < ALONG * np.sqrt(weights @ first.tangent**2):
+        return None
+    return float(last.arclength + share * length + ahead)
+
+
+def is_symmetric(problem: AbstractContinuableProblem, x: Array) -> bool:
+    """Whether a state is its own mirror image."""
+    image = problem.reflected(x) if isinstance(problem, AbstractSmoothProblem) else None
+    return image is not None and problem.norm(image - x, x) < MIRRORED
+
+
+def meets_mirror_image(point: Point) -> bool:
+    """Whether a branch that goes through this point is, beyond it, the mirror image of itself before it."""
+    problem, x = point.problem, point.x
+    if not isinstance(problem, AbstractSmoothProblem) or not is_symmetric(problem, x):
+        return False
+    image, weights = problem.reflected(point.tangent[:-1], increment=True), metric(problem, point.joined)
+    if image is None:
+        return False
+    along = point.tangent
+    overlap = weights @ (along * np.append(image, along[-1]))
+    return bool(overlap < -ALONG * (weights @ along**2))
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,7 @@ class Outcome(StrEnum):
     REPEATED = "repeated"
     NO_MORE_FOUND = "no-more-found"
     CLOSED = "closed"
+    REJOINED = "rejoined"
     OUT_OF_RANGE = "out-of-range"
     UNFOLDED = "unfolded"
     MAX_STARTS = "max-starts"
@@ -51,6 +52,7 @@ _SUCCESS = {
     Outcome.REACHED_STOP,
     Outcome.NO_MORE_FOUND,
     Outcome.CLOSED,
+    Outcome.REJOINED,
     Outcome.OUT_OF_RANGE,
     Outcome.MAX_STARTS,
 }
@@ -81,7 +83,10 @@ _ADVICE = {
     Outcome.NO_MORE_FOUND: (
         "None of the starts leads to a further state. That proves nothing of states that other starts may lead to: try more."
     ),
-    Outcome.CLOSED: "The curve came back to its start: this is all of it.",
+    Outcome.CLOSED: "It came back to its start: this is all of it.",
+    Outcome.REJOINED: (
+        "The branch came from one symmetric state to another: beyond lies the mirror image of what was passed."
+    ),
     Outcome.OUT_OF_RANGE: "The curve leaves the values that a key can take.",
     Outcome.UNFOLDED: "The branches part when this key changes, and cross at single values only: choose another key.",
     Outcome.MAX_STARTS: "The limit on starts was reached with others left: raise `--starts` and resume.",

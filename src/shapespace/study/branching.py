@@ -1,7 +1,7 @@
 """Branches of stationary states: followed in one key of a scenario, with special points, stability and physical ends."""
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,17 +11,17 @@ from shapespace.analysis.bifurcation import Kind, SingularPoint
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import MEMORY, Arclength, Continuation, Stop, start_point
 from shapespace.analysis.extended import Parameter
-from shapespace.analysis.passage import first_change
+from shapespace.analysis.passage import first_change, meets_mirror_image, passed_start
 from shapespace.analysis.tracing import side_branches
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint
+from shapespace.study.branch_request import Request
 from shapespace.study.branch_store import START, Branch, BranchStore, collected
 from shapespace.study.course import Course
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.keyed import HeldProblem, KeyedProblem
 from shapespace.study.landmarks import Surveyor, physical_end
-from shapespace.study.measures import make_observable
 from shapespace.study.paths import MAX_POINTS, StateName, state_names
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
@@ -29,7 +29,14 @@ from shapespace.study.starts import Start, find_start
 from shapespace.study.steady import Steady, key_values, steady, steady_near
 
 FIRST_STEP = 0.02
-ENDS = (Outcome.REACHED_STOP, Outcome.NECK_CLOSED, Outcome.SELF_CONTACT, Outcome.SELF_INTERSECTING)
+ENDS = (
+    Outcome.REACHED_STOP,
+    Outcome.CLOSED,
+    Outcome.REJOINED,
+    Outcome.NECK_CLOSED,
+    Outcome.SELF_CONTACT,
+    Outcome.SELF_INTERSECTING,
+)
 """A leg that came to one of these is complete."""
 
 
@@ -42,80 +49,6 @@ class _End(NamedTuple):
 
 Progress = Callable[[BranchPoint, int], None]
 """Called after each new point with the point and the number of points so far."""
-
-
-@dataclass(frozen=True)
-class Request:
-    """Which branch to follow: from start to stop in a key, with exact points at `at`.
-
-    free: the key that answers where `key` is an observable. at: values of the key, and (observable, value) pairs.
-
-    origin: stored state to begin at, as text; without it the state of this name, or the default one, or where there is none
-    the trivial one. side: 1 or -1 for either way along the other branch through a stored branch
-    point, 0 for the branch itself. both: also the other way, as far as from stop to start on the other side. stability:
-    growth rates at every point.
-    """
-
-    key: str
-    start: float
-    stop: float
-    at: tuple[float | tuple[str, float], ...] = ()
-    origin: str | None = None
-    state: str | None = None
-    side: int = 0
-    both: bool = False
-    stability: bool = True
-    free: str | None = None
-
-    def __post_init__(self) -> None:
-        if self.side not in (-1, 0, 1):
-            raise InputError(f"--side {self.side}: must be 1, -1 or 0; choose one of them.")
-        if self.side and self.origin is None:
-            raise InputError(f"--side {self.side}: needs a branch point to leave from; give it as --from STORE:LABEL.")
-        if self.origin is not None and self.state is not None:
-            raise InputError(f"--state {self.state} and --from {self.origin}: name two states; give only one.")
-        if self.start == self.stop and not self.side:
-            raise InputError(
-                f"--stop {self.stop:g}: must differ from the start, {self.start:g}; choose another --stop."
-            )
-        at = (("--at", one if isinstance(one, float) else one[1]) for one in self.at)
-        for name, value in (("--start", self.start), ("--stop", self.stop), *at):
-            if not np.isfinite(value):
-                raise InputError(f"{name} {value}: must be a finite number; give one.")
-
-    @property
-    def course(self) -> Course:
-        """What varies."""
-        return Course(self.key, self.free)
-
-    @property
-    def values(self) -> tuple[float, ...]:
-        """Of what varies, where to stop."""
-        return tuple(dict.fromkeys(one for one in self.at if isinstance(one, float) and one not in self.bounds))
-
-    def stops(self, scenario: Scenario) -> list[Stop]:
-        """The ends and the exact points."""
-        stops = [Stop(Parameter(0), value, "end", ends=True) for value in dict.fromkeys(self.bounds)]
-        stops += [Stop(Parameter(0), value, "user") for value in self.values]
-        for name, value in (one for one in self.at if not isinstance(one, float)):
-            stops.append(Stop(make_observable(scenario, name, self.course.moved), value, "user"))
-        return stops
-
-    @property
-    def direction(self) -> float:
-        """1 where the key rises from start to stop, else -1."""
-        return 1.0 if self.stop >= self.start else -1.0
-
-    @property
-    def bounds(self) -> tuple[float, ...]:
-        """Values of the key at which the branch ends."""
-        other = 2.0 * self.start - self.stop if self.both else self.start
-        return (self.stop,) if self.side else (self.stop, other)
-
-    @property
-    def span(self) -> float:
-        """Change of the key that counts as one."""
-        return abs(self.stop - self.start) or max(abs(self.stop), 1.0)
 
 
 def branch(
@@ -237,6 +170,8 @@ def _follow(
                 record(point)
             ended = surveyor.outcome
         outcome = ended if outcome.is_success else outcome
+        if ended is Outcome.CLOSED:
+            break
     return _End(outcome)
 
 
@@ -251,7 +186,8 @@ def _leg(
         return
     options = Arclength(first=FIRST_STEP, parameter_scale=request.span)
     continuation = Continuation(past, request.stops(surveyor.scenario), options)
-    last = past[-1]
+    start, last = _first(surveyor, request, done, leg), past[-1]
+    is_mirrored = meets_mirror_image(start)
     for point in continuation:
         end = physical_end(point)
         if end is not None:
@@ -262,7 +198,18 @@ def _leg(
             surveyor.outcome = end = Outcome.SELF_CONTACT if end is Outcome.SELF_INTERSECTING else end
             yield surveyor.end(inside, outside, end)
             return
-        yield from surveyor.between(last, point)
+        if (passed := passed_start(start, last, point)) is not None:
+            yield from surveyor.between(last, point, passed)
+            surveyor.outcome = Outcome.CLOSED
+            again = replace(start, arclength=passed, step=point.step)
+            yield surveyor.end(again, again, Outcome.CLOSED)
+            return
+        for special in surveyor.between(last, point):
+            if is_mirrored and meets_mirror_image(_placed(surveyor.scenario, request.course, special)[1]):
+                surveyor.outcome = Outcome.REJOINED
+                yield replace(special, ends=Outcome.REJOINED.value)
+                return
+            yield special
         yield surveyor.step(point)
         last = point
     surveyor.outcome = continuation.outcome or Outcome.MAX_STEPS
@@ -376,6 +323,13 @@ def _singular(point: BranchPoint, problem: KeyedProblem | HeldProblem, place: Po
     return SingularPoint(
         Kind(point.kind), problem, 0, place.x, place.p, point.parameter_error, point.directions, point.directions
     )
+
+
+def _first(surveyor: Surveyor, request: Request, done: Sequence[BranchPoint], leg: int) -> Point:
+    """Where a leg starts."""
+    stored = next(point for point in done if point.label == START)
+    _, start = _placed(surveyor.scenario, request.course, stored)
+    return start.reversed() if leg else start
 
 
 def _past(surveyor: Surveyor, done: Sequence[BranchPoint], leg: int) -> list[Point]:

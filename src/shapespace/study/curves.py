@@ -16,7 +16,6 @@ from shapespace.analysis.curves import (
     NotFound,
     Special,
     branches_at,
-    closes,
     is_unfolded,
     own_parameter,
     parameters_at,
@@ -25,7 +24,7 @@ from shapespace.analysis.curves import (
     traced_curve,
 )
 from shapespace.analysis.extended import Parameter
-from shapespace.analysis.passage import first_change
+from shapespace.analysis.passage import first_change, passed_start
 from shapespace.analysis.singular import SingularProblem
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
@@ -251,8 +250,8 @@ def _leg(recorder: "_Recorder", request: Request, leg: int, done: Sequence[Curve
             miss = (abs(own_parameter(outside) - own_parameter(inside)), abs(outside.parameter - inside.parameter))
             yield recorder.record(inside, end.value, miss, ends=end, is_step=False)
             return
-        if closes(start, last, one):
-            again = replace(start, arclength=one.arclength)
+        if (passed := passed_start(start, last, one)) is not None:
+            again = replace(start, arclength=passed)
             yield recorder.record(again, Outcome.CLOSED.value, ends=Outcome.CLOSED, is_step=False)
             return
         yield recorder.record(one, one.label, ends=Outcome.REACHED_STOP if one.label == "end" else None)
