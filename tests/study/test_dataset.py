@@ -12,15 +12,14 @@ from shapespace.base.errors import StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.base.scales import QUANTITIES
 from shapespace.study.dataset import make_dataset, open_dataset
+from shapespace.study.observables import FLOWS
 from shapespace.study.run import Run, run
 from shapespace.study.scenario import scenario
 from shapespace.study.store import RunStore
 
 NAMES = ("guided-division", "polar-swimmer", "membrane-protrusion", "vesicle")
 # A rate of change needs two states, and the flow of the flat disc has no limit at t = 0.
-UNKNOWN_AT_START = {key: {"energy_residual"} for key in NAMES} | {
-    "membrane-protrusion": {"energy_residual", "dissipation", "external_power"}
-}
+UNKNOWN_AT_START = {key: {"energy_residual"} for key in NAMES} | {"membrane-protrusion": {*FLOWS}}
 FLOW = ("tangential_velocity", "normal_velocity")
 
 

@@ -13,6 +13,7 @@ from shapespace.cli.shared import Store, StoreOrLabel, app, examples
     help_epilogue=examples(
         "shapespace plot results/guided-division",
         "shapespace plot results/guided-division --out division.pdf",
+        "shapespace plot results/guided-division --budget",
         "shapespace plot results/sphere:pitchfork-1 --mode 0",
     )
 )
@@ -27,6 +28,9 @@ def plot(
             metavar="N", help="Draw mode N, from 0, of DIR:LABEL of a branch, or of a state that `steady` stored."
         ),
     ] = None,
+    budget: Annotated[
+        bool, Parameter(help="Of a run or a state: energy, dissipation by channel and what supplies it (budget.png).")
+    ] = False,
     observable: Annotated[
         str | None, Parameter(metavar="NAME", help="Of a branch: what to draw against the key that varies.")
     ] = None,
@@ -35,7 +39,8 @@ def plot(
 
     Of a run a curve over time, snapshots of the surface, profiles of velocity and curvature; of a branch an observable
     against the key that varies, solid where it is stable, with its special points; of a curve the plane of its two keys; of
-    a mode the state displaced by it, the velocity of that motion, and profiles along the curve.
+    a mode the state displaced by it, the velocity of that motion, and profiles along the curve; with --budget what goes into
+    energy and heat, what supplies it, and what the energy law leaves over.
     """
     from shapespace.study.files import replacing
     from shapespace.study.records import noun_of
@@ -44,6 +49,8 @@ def plot(
     noun = noun_of(path)
     if observable is not None and (noun != "branch" or mode is not None):
         raise InputError(f"--observable {observable}: is for the figure of a branch; leave it away.")
+    if budget and (noun not in (None, "run") or mode is not None):
+        raise InputError("--budget: is for the figure of a run or of a state that `steady` stored; leave it away.")
     if mode is not None:
         from shapespace.study.modes import find_modes
         from shapespace.view.mode import plot_mode
@@ -61,6 +68,11 @@ def plot(
         from shapespace.view.branch import plot_branch
 
         figure = plot_branch(open_branch(path), observable)
+    elif budget:
+        from shapespace.study.dataset import open_dataset
+        from shapespace.view.budget import plot_budget
+
+        figure, name = plot_budget(open_dataset(path)), "budget.png"
     else:
         from shapespace.study.dataset import open_dataset
         from shapespace.view.figure import plot_run

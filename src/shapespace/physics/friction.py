@@ -15,7 +15,7 @@ class TangentialFriction(AbstractTerm):
     rotating surroundings turns rigidly with them, v_phi = Omega r, which is exact on any shape.
     """
 
-    ledger: ClassVar[Ledger] = Ledger.DISSIPATION
+    ledger: ClassVar[Ledger] = Ledger.FRICTION
     coefficient: Traced
     rotation: Traced
 
@@ -32,7 +32,7 @@ class NormalFriction(AbstractTerm):
     The only resistance that a flat piece of a surface has to being bent: viscosity in its plane has none.
     """
 
-    ledger: ClassVar[Ledger] = Ledger.DISSIPATION
+    ledger: ClassVar[Ledger] = Ledger.FRICTION
     coefficient: Traced
 
     def power(self, site: Site) -> Traced:

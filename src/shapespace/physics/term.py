@@ -25,13 +25,21 @@ class Site(NamedTuple):
 
 
 class Ledger(StrEnum):
-    """Where a power is booked in the energy law dF/dt + 2 D = external + chemical (exact result 5)."""
+    """Where a power is booked in the energy law dF/dt + 2 D = external + chemical; D has channels (exact result 5)."""
 
     ENERGY = "energy"
-    DISSIPATION = "dissipation"
+    SHEAR = "shear_dissipation"
+    BULK = "bulk_dissipation"
+    BENDING = "bending_dissipation"
+    FRICTION = "friction_dissipation"
+    REACTION = "chemical_dissipation"
     EXTERNAL = "external"
     CHEMICAL = "chemical"
     CONSTRAINT = "constraint"
+
+
+CHANNELS = (Ledger.SHEAR, Ledger.BULK, Ledger.BENDING, Ledger.FRICTION, Ledger.REACTION)
+"""Where work turns into heat: twice what is booked there, temperature times the entropy produced."""
 
 
 class AbstractTerm(eqx.Module):

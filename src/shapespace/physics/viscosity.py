@@ -11,7 +11,7 @@ from shapespace.physics.term import AbstractTerm, Ledger, Site
 class ShearViscosity(AbstractTerm):
     """(eta_s/2) [(S_uu - S_phiphi)^2 + (2 S_uphi)^2], half of S_2 (Eq. rayldens). viscosity: eta_s [energy time/length^2]."""
 
-    ledger: ClassVar[Ledger] = Ledger.DISSIPATION
+    ledger: ClassVar[Ledger] = Ledger.SHEAR
     viscosity: Traced
 
     def power(self, site: Site) -> Traced:
@@ -23,7 +23,7 @@ class ShearViscosity(AbstractTerm):
 class BulkViscosity(AbstractTerm):
     """(eta_b/2) (div v)^2, half of S_1 (Eq. rayldens). viscosity: eta_b [energy time/length^2]."""
 
-    ledger: ClassVar[Ledger] = Ledger.DISSIPATION
+    ledger: ClassVar[Ledger] = Ledger.BULK
     viscosity: Traced
 
     def power(self, site: Site) -> Traced:

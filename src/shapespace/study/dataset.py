@@ -16,6 +16,7 @@ from shapespace.models.open_membrane import local_spontaneous_curvature
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
+from shapespace.study.observables import FLOWS
 from shapespace.study.scenario import Scenario
 from shapespace.study.store import RunStore
 
@@ -27,7 +28,6 @@ CONVENTIONS = (
     "there, is at rest"
 )
 _FLOW_FIELDS = ("tangential_velocity", "normal_velocity")
-_FLOW_OBSERVABLES = ("velocity", "pressure", "dissipation", "chemical_power", "external_power")
 
 
 def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome | None) -> xr.Dataset:
@@ -37,7 +37,8 @@ def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome |
     times = np.array([frame.time for frame in frames])
     fields = [_fields(engine, frame) for frame in frames]
     series = [frame.observables for frame in frames]
-    if frames[0].step == 0.0 and "p" in engine.system.scalars:
+    # A run's first state is given, a stationary one that was stored is solved for.
+    if frames[0].step == 0.0 and "dissipation" not in series[0] and "p" in engine.system.scalars:
         fields[0], series[0] = _set_in_motion(fields, series, _flow_observables(engine))
     if "velocity" in series[-1]:
         travelled = _travelled(times, np.array([values.get("velocity", 0.0) for values in series]))
@@ -99,7 +100,7 @@ def _set_in_motion(
 
 def _flow_observables(engine: Engine) -> tuple[str, ...]:
     """Those that belong to the motion, not to the shape: a tension too where it holds the area."""
-    return (*_FLOW_OBSERVABLES, *(("tension", "tension_pole") if "sigma" in engine.system.scalars else ()))
+    return ("velocity", "pressure", *FLOWS, *(("tension", "tension_pole") if "sigma" in engine.system.scalars else ()))
 
 
 def _travelled(times: Array, speeds: Array) -> Array:

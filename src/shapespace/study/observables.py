@@ -8,13 +8,19 @@ from shapespace.base.problem import Rate
 from shapespace.geometry.contact import crosses_itself
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.state import State
+from shapespace.physics.term import CHANNELS
 from shapespace.study.engine import Engine
-from shapespace.variational.ledger import densities
+from shapespace.variational.ledger import boundary_power, densities
 
 CLOSING_RADIUS = 1e-4
 """A neck thinner than this, in units of the surface's length scale, counts as closed."""
 OUTLINE = 6
 """Segments of an outline per element, to see where it crosses itself."""
+DISSIPATIONS = tuple(channel.value for channel in CHANNELS)
+"""The channels of the dissipation, of which a model has some."""
+SUPPLIES = ("force_power", "boundary_power", "chemical_power")
+FLOWS = ("dissipation", *DISSIPATIONS, "external_power", *SUPPLIES, "energy_rate", "energy_residual", "amount_supply")
+"""What belongs to the motion of a surface, not to its shape: not known of a state that is given."""
 _SAMPLES_PER_ELEMENT = 4
 _ZOOMS = 5
 """Each narrows the place of an extremum eightfold; its value then is exact to round-off."""
@@ -33,7 +39,8 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
         "length": scalars["h"],
         "equator_radius": float(state.values(np.array([0.5]))[0, column["r"]]),
         "max_meridional_curvature": peaks["curvature"],
-        **{name: integrals[name] for name in ("area", "bending_energy", "dissipation", "energy", "external_power")},
+        **{name: integrals[name] for name in ("area", "bending_energy", "energy")},
+        **_powers(engine, integrals, first, last),
     }
     radius = neck_radius(state, column["r"])
     if radius is not None:
@@ -43,12 +50,23 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
         out |= _regulated(engine, state, column, integrals) if "c" in column else {}
         out |= dict.fromkeys(("tension", "tension_pole"), scalars["sigma"]) if "sigma" in scalars else {}
     else:
-        # The rim lets matter in at the reservoir's tension, which does work on the membrane.
-        out["external_power"] += 2.0 * np.pi * last[column["meridional_force"]] * last[column["v"]]
         out["tension_pole"] = float(state.algebraic_values(np.array([0.0]))[0, 0])
         out["pulling_force"] = integrals["pulling_force"]
         out["pulling_force_per_2pi"] = integrals["pulling_force"] / (2.0 * np.pi)
     return {name: float(value) for name, value in out.items()}
+
+
+def _powers(engine: Engine, integrals: dict[str, float], first: Array, last: Array) -> dict[str, float]:
+    """What is dissipated, by channel, and supplied; a rim lets matter in at the reservoir's tension, which does work."""
+    named = {name: integrals[name] for name in DISSIPATIONS if name in integrals}
+    work = {"force_power": integrals["force_power"], "boundary_power": boundary_power(engine.system, first, last)}
+    return {"dissipation": sum(named.values()), **named, "external_power": sum(work.values()), **work}
+
+
+def energy_law(values: dict[str, float], rate: float) -> dict[str, float]:
+    """dF/dt, and what it leaves of the energy law: dF/dt + 2 D - external - chemical power."""
+    supply = values["external_power"] + values.get("chemical_power", 0.0)
+    return {"energy_rate": rate, "energy_residual": rate + values["dissipation"] - supply}
 
 
 def _closed(
@@ -76,7 +94,7 @@ def _regulated(engine: Engine, state: State, column: dict[str, int], integrals: 
         + v["active_tension"] * c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2),
         "max_concentration": largest,
         "ring_position": position,
-        "chemical_power": integrals["chemical_power"],
+        **{name: integrals[name] for name in ("chemical_power", "amount", "amount_supply")},
     }
 
 

@@ -12,7 +12,7 @@ from shapespace.base.problem import Rate
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
-from shapespace.study.observables import measure, shape_end
+from shapespace.study.observables import FLOWS, energy_law, measure, shape_end
 from shapespace.study.scenario import Scenario
 
 ORDER = 3
@@ -76,8 +76,7 @@ class Simulation:
         values = measure(engine, moment.x, rate)
         values |= self._energy_law(moment.time, values)
         if resting:
-            for name in ("dissipation", "chemical_power", "external_power", "energy_residual"):
-                values.pop(name, None)
+            values = {name: value for name, value in values.items() if name not in FLOWS}
         state, scales = problem.unpack(moment.x), self.scenario.scales
         return Frame(
             time=moment.time * scales.factor("time"),
@@ -93,14 +92,12 @@ class Simulation:
         )
 
     def _energy_law(self, time: float, values: dict[str, float]) -> dict[str, float]:
-        """dF/dt + 2 D - external - chemical power, with dF/dt by the differences that the step itself used."""
+        """dF/dt by the differences that the step itself used, and the rest of the energy law."""
         self._energies = [*self._energies, (time, values["energy"])][-(self._order + 1) :]
         if len(self._energies) < 2:
             return {}
         times, energies = (np.array(column)[::-1] for column in zip(*self._energies, strict=True))
-        change = float(derivative_weights(times) @ energies)
-        supply = values["external_power"] + values.get("chemical_power", 0.0)
-        return {"energy_residual": change + values["dissipation"] - supply}
+        return energy_law(values, float(derivative_weights(times) @ energies))
 
 
 def _shape_event(moment: Moment) -> Outcome | None:

@@ -23,7 +23,7 @@ from shapespace.study.engine import Engine, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.modes import Modes
-from shapespace.study.observables import measure, shape_end
+from shapespace.study.observables import energy_law, measure, shape_end
 from shapespace.study.paths import MAX_POINTS, NEWTON, StateName, along, read_state_name, steps
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
@@ -138,6 +138,7 @@ def observables_at(scenario: Scenario, problem: CollocationProblem, x: Array) ->
     """Observables of a state of the scenario at rest, in its units."""
     engine = replace(Engine.of(scenario), problem=problem)
     values = measure(engine, x, Rate.of_growth(problem.stored(x, engine.p)))
+    values |= energy_law(values, 0.0)
     return {name: value * scenario.scales.factor(name) for name, value in values.items()}
 
 

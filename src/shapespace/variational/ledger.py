@@ -4,16 +4,20 @@ Multiplying each variation by its rate and integrating gives, with 2 D the dissi
 
     dF/dt + 2 D = external + chemical power,
 
-where the external power includes that of the rim, 2 pi P_v v_u at u = 1.
+where D is the sum of its channels and the external power that of forces and of the ends, 2 pi [P_v v_u + P_phi v_phi]
+from u = 0 to 1 (`boundary_power`): shape coordinates are held or free of force there. Of a species the amount
+2 pi int c r h du changes by its supply alone, 2 pi int (d(c r h)/dt + N') du.
 """
+
+import math
 
 import jax.numpy as jnp
 
-from shapespace.base.arrays import Traced
+from shapespace.base.arrays import Array, Traced
 from shapespace.geometry.curve import area_element, meridional_curvature, volume_element
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.force import AxialForce
-from shapespace.physics.term import AbstractEnergy, Ledger
+from shapespace.physics.term import CHANNELS, AbstractEnergy, AbstractTerm, Ledger
 from shapespace.variational.rayleighian import booked_power
 from shapespace.variational.surface import SurfaceSystem
 
@@ -21,7 +25,7 @@ from shapespace.variational.surface import SurfaceSystem
 def densities(
     system: SurfaceSystem, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, p: Traced
 ) -> dict[str, Traced]:
-    """Densities per du of area, volume, energies and powers; `curvature` = |C_u^u| serves for its largest value."""
+    """Densities per du of area, volume, energies, powers, amounts; `curvature` = |C_u^u| serves for its largest value."""
     del a  # multipliers do no work
     site = system.site(dy, y, s, dq)
     g, terms = site.geometry, system.terms(system.named(p))
@@ -30,14 +34,33 @@ def densities(
     bending = [term for term in energies if isinstance(term, HelfrichBending)]
     forces = [term for term in terms if isinstance(term, AxialForce)]
     zero = jnp.zeros(())
-    return {
+    found = {
         "area": element,
         "volume": volume_element(g),
         "energy": sum((term.density(g) * element for term in energies), start=zero),
         "bending_energy": sum((term.density(g) * element for term in bending), start=zero),
-        "dissipation": 4.0 * jnp.pi * booked_power(terms, Ledger.DISSIPATION, site),
         "chemical_power": -2.0 * jnp.pi * booked_power(terms, Ledger.CHEMICAL, site),
-        "external_power": -2.0 * jnp.pi * booked_power(terms, Ledger.EXTERNAL, site),
+        "force_power": -2.0 * jnp.pi * booked_power(terms, Ledger.EXTERNAL, site),
         "pulling_force": sum((term.density(g.area) * element for term in forces), start=zero),
         "curvature": jnp.abs(meridional_curvature(g)),
     }
+    found |= {channel.value: 4.0 * jnp.pi * booked_power(terms, channel, site) for channel in channels(terms)}
+    if system.species is not None:
+        supply = dq[4] + system.field_values(dy)["species_flux"]
+        found |= {"amount": element * site.concentration, "amount_supply": 2.0 * jnp.pi * supply}
+    return found
+
+
+def channels(terms: tuple[AbstractTerm, ...]) -> tuple[Ledger, ...]:
+    """The channels of dissipation that a model has."""
+    return tuple(channel for channel in CHANNELS if any(term.ledger is channel for term in terms))
+
+
+def boundary_power(system: SurfaceSystem, y0: Array, y1: Array) -> float:
+    """2 pi [P_v v_u + P_phi v_phi] between the fields at u = 0 and at u = 1: the work of whatever drives the ends."""
+
+    def work(y: Array) -> float:
+        f = dict(zip(system.fields, y.tolist(), strict=True))
+        return float(f["meridional_force"] * f["v"] + f.get("azimuthal_force", 0.0) * f.get("v_phi", 0.0))
+
+    return 2.0 * math.pi * (work(y1) - work(y0))

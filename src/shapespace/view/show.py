@@ -14,6 +14,7 @@ from shapespace.study.dataset import open_dataset
 from shapespace.study.modes import find_modes
 from shapespace.study.records import noun_of
 from shapespace.view.branch import plot_branch
+from shapespace.view.budget import plot_budget
 from shapespace.view.curve import plot_curve
 from shapespace.view.figure import plot_run
 from shapespace.view.mode import plot_mode
@@ -47,12 +48,19 @@ def _figure(source: Source | Branch | Curve) -> Figure:
     return plot_curve(source) if isinstance(source, Curve) else plot_run(_dataset_of(source))
 
 
-def plot(source: Source | Branch | Curve, out: str | Path | None = None, *, mode: int | None = None) -> Figure:
+def plot(
+    source: Source | Branch | Curve, out: str | Path | None = None, *, mode: int | None = None, budget: bool = False
+) -> Figure:
     """The figure of a run, a branch or a curve, stored or not; also written to `out` (.png, .pdf, .svg) if given.
 
     mode: number of a mode of a stored state to draw instead, `source` being `DIR:LABEL` of a branch or `DIR` of a state.
+    budget: of a run or a state, what goes into energy and heat and what supplies it.
     """
-    if mode is None:
+    if budget:
+        if mode is not None or isinstance(source, Branch | Curve):
+            raise InputError("budget = True: is for the figure of a run or of a stored state; leave it away.")
+        figure = plot_budget(_dataset_of(source))
+    elif mode is None:
         figure = _figure(source)
     elif isinstance(source, str | Path):
         figure = plot_mode(find_modes(str(source)), mode)
