@@ -10,7 +10,7 @@ import numpy as np
 from tests.dense import DenseLinearisation
 
 from shapespace.base.arrays import Array, Traced
-from shapespace.base.problem import AbstractSmoothProblem, Border, Rate
+from shapespace.base.problem import AbstractSmoothProblem, Actions, Border, Rate
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,8 @@ class AlgebraicProblem(AbstractSmoothProblem):
     def second_derivative(self, x: Array, p: Array, one: Array, dp: Array, other: Array, ep: Array) -> Array:
         return np.asarray(self._second_derivative(x, p, one, dp, other, ep))
 
-    def mass(self, x: Array, p: Array, dx: Array) -> Array:
-        return -dx
+    def actions(self, x: Array, p: Array) -> Actions:
+        return Actions(lambda dx: self.derivative(x, p, dx, np.zeros_like(p)), lambda dx: -dx)
 
     def weights(self, x: Array) -> Array:
         return 1.0 / np.maximum(np.abs(x), 1.0) ** 2

@@ -173,8 +173,7 @@ def test_higher_degrees_converge():
 def dense_rates(problem: CollocationProblem, x: Array, p: Array) -> Array:
     """All finite eigenvalues of the dense pencil, by QZ."""
     unit = np.eye(len(x))
-    jacobian = np.stack([problem.derivative(x, p, column, np.zeros_like(p)) for column in unit], axis=1)
-    mass = np.stack([problem.mass(x, p, column) for column in unit], axis=1)
+    jacobian, mass = (np.stack([action(column) for column in unit], axis=1) for action in problem.actions(x, p))
     alpha, beta = scipy.linalg.eigvals(jacobian, -mass, homogeneous_eigvals=True)
     finite = np.abs(beta) > 1e-7 * np.abs(alpha)
     return alpha[finite] / beta[finite]
@@ -208,7 +207,8 @@ def test_infinite_eigenvalues_are_gone_after_two_applications():
     x, p = np.zeros(2 * 3 + 2 * 2 * 2 + 2 * 2 + 1), np.ones(1)
     rate = Rate.of_growth(problem.stored(x, p), 10.0)
     factors = problem.linearise(x, p, rate)[1]
-    s = np.stack([factors.solve(problem.mass(x, p, column)) for column in np.eye(len(x))], axis=1)
+    mass = problem.actions(x, p).mass
+    s = np.stack([factors.solve(mass(column)) for column in np.eye(len(x))], axis=1)
     ranks = [np.linalg.matrix_rank(np.linalg.matrix_power(s, k), tol=1e-9) for k in (1, 2, 3)]
     assert ranks[0] > ranks[1] == ranks[2] == len(dense_rates(problem, x, p))
 

@@ -255,10 +255,11 @@ class _Trial:
         if len(self.places) < 2 or not self.places[-2].test * self.now.test > 0.0:
             return False
         back = self.places[-2].arclength - self.now.arclength
-        values = np.array([self.places[-2].test, self.now.test, end.test]) / self.now.test
-        c, b, a = np.linalg.solve(np.vander([back, 0.0, step], increasing=True), values)
-        dip = -b / (2.0 * a) if a > 0.0 else 0.0
-        return 0.0 < dip < step and c + dip * (b + dip * a) < 0.0
+        # 1 + b s + a s^2 through all three, in units of its value here.
+        before, after = (self.places[-2].test / self.now.test - 1.0) / back, (end.test / self.now.test - 1.0) / step
+        a = (after - before) / (step - back)
+        b = after - a * step
+        return a > 0.0 and 0.0 < -b < 2.0 * a * step and b * b > 4.0 * a
 
     def stop(self, end: Point, s: float, stop: Stop) -> Point | None:
         """The exact point of a stop near arclength s on the way to an end; None where Newton fails or ends far off."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from shapespace.analysis.extended import AbstractMeasure
 from shapespace.base.arrays import Array
-from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Border, Rate
+from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Actions, Border, Rate
 
 INCREMENT = 1e-5
 """Of the state, relative to it (or one), over which a measure's gradient is differenced."""
@@ -75,9 +75,10 @@ class ControlledProblem(AbstractSmoothProblem):
         bend = (slopes[0] - slopes[1]) / (2.0 * step)
         return np.append(self.inner.second_derivative(state, full, d, dq, e, eq), bend)
 
-    def mass(self, x: Array, p: Array, dx: Array) -> Array:
+    def actions(self, x: Array, p: Array) -> Actions:
         """Of the inner problem; the condition holds at once."""
-        return np.append(self.inner.mass(*self.split(x, p), dx[:-1]), 0.0)
+        mass, still = self.inner.actions(*self.split(x, p)).mass, np.zeros_like(p)
+        return Actions(lambda dx: self.derivative(x, p, dx, still), lambda dx: np.append(mass(dx[:-1]), 0.0))
 
     def stored(self, x: Array, p: Array) -> Array:
         """Of the inner problem."""

@@ -238,7 +238,7 @@ class SingularProblem(AbstractContinuableProblem):
     def mass_form(self, x: Array, p: Array) -> float:
         """psi B v/(psi b) of a fold."""
         kernel = self.factors(x, p)
-        return kernel.project(self.base.mass(self.state(x), self.parameters(x, p), kernel.vectors[0]))
+        return kernel.project(self.base.actions(self.state(x), self.parameters(x, p)).mass(kernel.vectors[0]))
 
     def adapted(self, x: Array) -> "SingularProblem":
         """On the discretisation that the base asks for at the state, with the kernel carried there."""

@@ -149,12 +149,13 @@ class _Search:
     def __post_init__(self) -> None:
         self.applications = 0
         self.factorisations = 0
+        self.actions = self.problem.actions(self.x, self.p)
         self.signs: dict[float, float] = {}
 
     def pencil(self, shift: float) -> Pencil:
         """Factorised at a shift, and its sign noted; a shift that meets a rate gives way to the right."""
         for _ in range(self.options.max_attempts):
-            pencil = Pencil(self.problem, self.x, self.p, shift)
+            pencil = Pencil(self.problem, self.x, self.p, shift, self.actions)
             self.factorisations += 1
             if not pencil.linearisation.is_singular:
                 break

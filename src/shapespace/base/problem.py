@@ -6,7 +6,9 @@ M dx/dt = G(x, p) is the case q = x, F = M dq/dt - G.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from shapespace.base.arrays import Array
 
@@ -105,6 +107,13 @@ class AbstractContinuableProblem(AbstractProblem):
         """w (n,), not negative: sum_i w_i a_i b_i is an inner product of increments near x that no discretisation changes."""
 
 
+class Actions(NamedTuple):
+    """Products with the matrices of a pencil at one state, dx (n,) -> (n,): the Jacobian J and the mass B."""
+
+    jacobian: Callable[[Array], Array]
+    mass: Callable[[Array], Array]
+
+
 class AbstractSmoothProblem(AbstractContinuableProblem):
     """A problem whose singular points can be located and whose solutions can be judged."""
 
@@ -113,8 +122,8 @@ class AbstractSmoothProblem(AbstractContinuableProblem):
         """The second derivative of F at rest along (one, dp) and (other, ep), (n,)."""
 
     @abstractmethod
-    def mass(self, x: Array, p: Array, dx: Array) -> Array:
-        """The mass action B dx = dF/d(dq/dt) dq/dx dx (n,) at rest."""
+    def actions(self, x: Array, p: Array) -> Actions:
+        """J dx = F_x dx and B dx = dF/d(dq/dt) dq/dx dx at rest."""
 
     def refined(self) -> "AbstractSmoothProblem | None":
         """The same problem on a discretisation about twice as fine, to estimate errors; None where there is none."""

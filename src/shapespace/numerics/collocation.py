@@ -1,6 +1,6 @@
 """Gauss collocation of an AbstractSystem: residual, structured Jacobian and stored quantities on a given mesh."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from shapespace.base.arrays import Array
-from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Border, Rate
+from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Actions, Border, Rate
 from shapespace.numerics import condensation
 from shapespace.numerics.adaptation import adapted_mesh
 from shapespace.numerics.border import with_border
 from shapespace.numerics.gauss import gauss_rule
-from shapespace.numerics.layout import assembled, by_element, joined, lay_out
+from shapespace.numerics.layout import assembled, by_element, joined, lay_out, product
 from shapespace.numerics.pointwise import Density, Functions, compiled_functions, numbers, points_per_tile
 from shapespace.numerics.small_lu import compiled
 from shapespace.numerics.state import State
@@ -24,16 +24,23 @@ RELATIVE_FLOOR = 1.0
 
 REST = Rate(0.0, np.zeros(0))
 """dq/dt = 0, whatever q."""
+FAST = 2.0**20
+"""A rate of growth at which the mass stands out of the Jacobian's round-off."""
 
 
 @compiled
 def _largest_relative(change, values, columns, weights):  # type: ignore[no-untyped-def]
-    """max over columns of max_i |weights_i change_ic| / max(max_i |values_ic|, floor), both flat and columns wide."""
+    """max over columns of max_i |weights_i change_ic| / max(max_i |values_ic|, floor), both flat and columns wide.
+
+    weights may be empty, for ones.
+    """
     largest = 0.0
     for c in range(columns):
         top, scale = 0.0, RELATIVE_FLOOR
         for i in range(change.shape[0] // columns):
-            difference = abs(weights[i] * change[i * columns + c])
+            difference = abs(change[i * columns + c])
+            if weights.shape[0] > 0:
+                difference *= weights[i]
             if not difference <= top:
                 top = difference
         for i in range(values.shape[0] // columns):
@@ -42,6 +49,19 @@ def _largest_relative(change, values, columns, weights):  # type: ignore[no-unty
             return np.inf
         largest = max(largest, top / scale)
     return largest
+
+
+@compiled
+def _norm(dx, x, n, n_a, k, widths):  # type: ignore[no-untyped-def]
+    """Of `CollocationProblem.norm`; widths (N k,): of each point's element."""
+    slopes = (widths.shape[0] // k + 1) * n
+    algebraic = slopes + widths.shape[0] * n
+    scalars = algebraic + widths.shape[0] * n_a
+    ones = widths[:0]
+    largest = _largest_relative(dx[:slopes], x[:slopes], n, ones)
+    largest = max(largest, _largest_relative(dx[slopes:algebraic], x[:slopes], n, widths))
+    largest = max(largest, _largest_relative(dx[algebraic:scalars], x[algebraic:scalars], n_a, ones))
+    return max(largest, _largest_relative(dx[scalars:], x[scalars:], dx.shape[0] - scalars, ones))
 
 
 @dataclass(frozen=True)
@@ -118,9 +138,9 @@ class CollocationProblem(AbstractSmoothProblem):
         return State(self.mesh, nodes, slopes, x[b:c].reshape(elements, k, n_a), x[c:])
 
     @cached_property
-    def _point_weights(self) -> tuple[Array, Array]:
-        """Ones for as many rows as there are anywhere, and each Gauss point's element width."""
-        return np.ones(self.elements * self.degree + 2), np.repeat(self._widths, self.degree)
+    def _point_widths(self) -> Array:
+        """Each Gauss point's element width."""
+        return np.repeat(self._widths, self.degree)
 
     @cached_property
     def functions(self) -> Functions:
@@ -190,10 +210,20 @@ class CollocationProblem(AbstractSmoothProblem):
         tiles = zip(self._tiles(x, p), self._tiles(one, dp), self._tiles(other, ep), strict=True)
         return self._assembled([self.functions.second_derivative(*tile) for tile in tiles], np.zeros_like(x))
 
-    def mass(self, x: Array, p: Array, dx: Array) -> Array:
-        """dF/d(dq/dt) dq/dx dx at rest, flat as the residual."""
-        tiles = zip(self._tiles(x, p), self._tiles(dx, np.zeros_like(p)), strict=True)
-        return self._assembled([self.functions.mass(at, along) for at, along in tiles], np.zeros_like(x))
+    def actions(self, x: Array, p: Array) -> Actions:
+        """By the blocks of the Jacobian at rest, and by their change as all grows at some rate, in which they are linear."""
+        rest = self.blocks(x, p, REST)[1:]
+        growing = self.blocks(x, p, Rate.of_growth(self.stored(x, p), FAST))[1:]
+        mass = [(after - before) / FAST for after, before in zip(growing, rest, strict=True)]
+        return Actions(self._product(rest, 1.0), self._product(mass, 0.0))
+
+    def _product(self, blocks: Sequence[Array], jumps: float) -> Callable[[Array], Array]:
+        """Multiplication by a matrix of these blocks (points, ends, targets), with `jumps` times the continuity rows."""
+        points, ends, targets = blocks
+        structure, rule = points.any(axis=(2, 3)), gauss_rule(self.degree)
+        return lambda dx: product(
+            np.ascontiguousarray(dx), points, structure, ends, targets, self.mesh, rule.matrix, rule.weights, jumps
+        )
 
     def stored(self, x: Array, p: Array) -> Array:
         """q at the Gauss points and at both ends, flattened."""
@@ -219,33 +249,27 @@ class CollocationProblem(AbstractSmoothProblem):
 
         A change of a slope counts as what it adds over its element.
         """
-        n, n_a, points = self.n, len(self.system.algebraic), self.elements * self.degree
-        a = (self.elements + 1) * n
-        b = a + points * n
-        c = b + points * n_a
-        ones, widths = self._point_weights
-        nodes = _largest_relative(dx[:a], x[:a], n, ones)
-        slopes = _largest_relative(dx[a:b], x[:a], n, widths)
-        algebraic = _largest_relative(dx[b:c], x[b:c], n_a, ones)
-        scalars = _largest_relative(dx[c:], x[c:], len(x) - c, ones)
-        return float(max(nodes, slopes, algebraic, scalars))
+        return float(_norm(dx, x, self.n, self.n_rows - self.n, self.degree, self._point_widths))
 
     def weights(self, x: Array) -> Array:
         """Of node values by the trapezoidal rule over u and of scalars, each relative to its largest value (or one)."""
         nodes = x[: (self.elements + 1) * self.n].reshape(-1, self.n)
         scale = np.maximum(np.abs(nodes).max(axis=0), RELATIVE_FLOOR)
-        shares = 0.5 * (np.append(self._widths, 0.0) + np.append(0.0, self._widths))
         weights = np.zeros_like(x)
-        weights[: nodes.size] = (shares[:, None] / scale**2).ravel()
+        weights[: nodes.size] = (self._node_shares / scale**2).ravel()
         scalars = len(self.system.scalars)
         if scalars:
             weights[-scalars:] = 1.0 / np.maximum(np.abs(x[-scalars:]), RELATIVE_FLOOR) ** 2
         return weights
 
+    @cached_property
+    def _node_shares(self) -> Array:
+        """Weights (N + 1, 1) of the trapezoidal rule."""
+        return 0.5 * (np.append(self._widths, 0.0) + np.append(0.0, self._widths))[:, None]
+
     def stored_norm(self, dq: Array, q: Array) -> float:
         """Largest change of any stored quantity relative to its largest value (or one)."""
-        ones, _ = self._point_weights
-        return float(_largest_relative(dq, q, len(q) // (self.elements * self.degree + 2), ones))
+        return float(_largest_relative(dq, q, len(q) // (self.elements * self.degree + 2), dq[:0]))
 
     def adapted(self, x: Array) -> "CollocationProblem":
         """On a mesh that follows x, refined to the next size where the estimated error exceeds the tolerance."""

@@ -90,6 +90,67 @@ def assembled(values, x, mesh, weights, n, m, n_i, points_per_tile):  # type: ig
     return out
 
 
+@compiled
+def product(x, points, structure, ends, targets, mesh, matrix, weights, jumps):  # type: ignore[no-untyped-def]
+    """A collocation matrix with blocks as in `condensation.factorise` times x, flat as the residual.
+
+    structure (m + n_i, m + n + n_s): which entries of `points` are not zero throughout. jumps: factor of the continuity rows.
+    """
+    n_rows, columns, k, elements = points.shape
+    n_i, (n_b, end_columns) = targets.shape[0], ends.shape
+    m, n_s = n_rows - n_i, targets.shape[1]
+    n, n_a = (end_columns - n_s) // 2, m - (end_columns - n_s) // 2
+    slopes, continuity = (elements + 1) * n, elements * k * m
+    algebraic = slopes + elements * k * n
+    scalars = x[algebraic + elements * k * n_a :]
+    widths = mesh[1:] - mesh[:-1]
+    out = np.zeros(continuity + elements * n + n_b + n_i)
+    integrals = out[continuity + elements * n + n_b :]
+    nodes, inside = x[:slopes].reshape(-1, n), x[slopes:algebraic].reshape(elements, k, n)
+    values, total = np.empty(elements), np.empty((n_rows, elements))
+    for j in range(k):
+        total[:] = 0.0
+        for c in range(columns):
+            if not structure[:, c].any():
+                continue
+            if c < n:
+                values[:] = inside[:, j, c]
+            elif c < m:
+                values[:] = x[algebraic + j * n_a + c - n : algebraic + elements * k * n_a : k * n_a][:elements]
+            elif c < m + n:
+                values[:] = 0.0
+                for l in range(k):
+                    values += matrix[j, l] * inside[:, l, c - m]
+                values = nodes[:elements, c - m] + widths * values
+            else:
+                values[:] = scalars[c - m - n]
+            for row in range(n_rows):
+                if structure[row, c]:
+                    block, target = points[row, c, j], total[row]
+                    for e in range(elements):
+                        target[e] += block[e] * values[e]
+        for row in range(m):
+            for e in range(elements):
+                out[(e * k + j) * m + row] = total[row, e]
+        for q in range(n_i):
+            integrals[q] += weights[j] * (widths * total[m + q]).sum()
+    if jumps != 0.0:
+        for e in range(elements):
+            for c in range(n):
+                rise = 0.0
+                for l in range(k):
+                    rise += weights[l] * inside[e, l, c]
+                out[continuity + e * n + c] = jumps * (nodes[e + 1, c] - nodes[e, c] - widths[e] * rise)
+    at_ends = np.concatenate((nodes[0], nodes[elements], scalars))
+    for i in range(n_b):
+        for c in range(end_columns):
+            out[continuity + elements * n + i] += ends[i, c] * at_ends[c]
+    for q in range(n_i):
+        for c in range(n_s):
+            integrals[q] -= targets[q, c] * scalars[c]
+    return out
+
+
 def by_element(rows: Array, k: int) -> Array:
     """Rows (q, k N), stage by stage, as rows (k N, q), element by element."""
     q, points = rows.shape

@@ -167,15 +167,6 @@ def _second_derivative(system: AbstractSystem, at: Traced, one: Traced, other: T
     return jax.jvp(lambda at: _derivative(system, at, along), (_opened(system, at),), (_change(system, other),))[1]
 
 
-def _mass(system: AbstractSystem, at: Traced, along: Traced) -> Traced:
-    """d(values)/d(dq/dt) dq, dq being the change of q."""
-    tile, change = _opened(system, at), _change(system, along)
-    where = (tile.rows, tile.scalars, tile.ends)
-    _, (dq, dq_ends) = jax.jvp(partial(_stored_at, system), where, (change.rows, change.scalars, change.ends))
-    still = jax.tree.map(jnp.zeros_like, tile)
-    return _derivative(system, tile, still._replace(history=dq, end_history=dq_ends))
-
-
 def _densities(system: AbstractSystem, density: Density, packed: Traced) -> dict[str, Traced]:
     """Named densities (T,)."""
     tile = _opened(system, packed)
@@ -199,7 +190,6 @@ class Functions(NamedTuple):
     stored: Callable[..., tuple[Traced, Traced]]
     derivative: Callable[..., Traced]
     second_derivative: Callable[..., Traced]
-    mass: Callable[..., Traced]
     densities: Callable[..., dict[str, Traced]]
 
 
@@ -212,6 +202,5 @@ def compiled_functions(system: AbstractSystem) -> Functions:
         stored=jax.jit(partial(_stored, system)),
         derivative=jax.jit(partial(_first_derivative, system)),
         second_derivative=jax.jit(partial(_second_derivative, system)),
-        mass=jax.jit(partial(_mass, system)),
         densities=jax.jit(partial(_densities, system), static_argnums=0),
     )

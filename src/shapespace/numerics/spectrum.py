@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapespace.base.arrays import Array
-from shapespace.base.problem import AbstractLinearisation, AbstractSmoothProblem, Rate
+from shapespace.base.problem import AbstractLinearisation, AbstractSmoothProblem, Actions, Rate
 
 ComplexArray = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
@@ -31,7 +31,7 @@ SETTLED = 1e-4
 """Ritz pairs with an estimated relative residual below this are on their way to an eigenvalue nearby."""
 BREAKDOWN = 1e-13
 """A new direction that is a smaller part of its image than this is round-off: the space is invariant."""
-INFINITE = 1e-10
+INFINITE = 1e-8
 """Eigenvalues of S smaller than this part of the largest are zero but for round-off: their rates are infinite."""
 UNSEEN = 1e-4
 """Mean square weight of entries that the problem's inner product leaves out: slopes and fields known at points only."""
@@ -58,6 +58,7 @@ class Pencil:
     x: Array
     p: Array
     shift: float
+    actions: Actions
 
     @cached_property
     def linearisation(self) -> AbstractLinearisation:
@@ -79,17 +80,16 @@ class Pencil:
 
     def apply(self, dx: Array) -> Array:
         """S dx = (J + shift B)^-1 B dx."""
-        return self.linearisation.solve(self.problem.mass(self.x, self.p, dx))
+        return self.linearisation.solve(self.actions.mass(dx))
 
     def defect(self, rate: complex, mode: ComplexArray) -> ComplexArray:
         """(J + shift B)^-1 (J + rate B) mode: zero for an eigenpair; mode - defect is one inverse iteration further."""
-        zero = np.zeros_like(self.p)
         real, imaginary = np.ascontiguousarray(mode.real), np.ascontiguousarray(mode.imag)
 
         def parts(dx: Array) -> tuple[Array, Array]:
             if not dx.any():
                 return dx, dx
-            return self.problem.derivative(self.x, self.p, dx, zero), self.problem.mass(self.x, self.p, dx)
+            return self.actions.jacobian(dx), self.actions.mass(dx)
 
         (j_re, b_re), (j_im, b_im) = parts(real), parts(imaginary)
         first = self.linearisation.solve(j_re + rate.real * b_re - rate.imag * b_im)
@@ -107,18 +107,13 @@ class Krylov:
         self.dimension = 0
         self.applications = 2
         self._basis = np.empty((capacity + 1, n))
-        self._weighted = np.empty_like(self._basis)
         self._matrix = np.zeros((capacity + 1, capacity))
         # Random, so that no mode is left out: from a start of one parity the others would never appear.
         start = pencil.apply(pencil.apply(np.random.default_rng(seed).standard_normal(n)))
         size = pencil.size(start)
         if size > 0.0:
-            self._keep(0, start / size)
+            self._basis[0] = start / size
         self.is_invariant = not size > 0.0
-
-    def _keep(self, index: int, vector: Array) -> None:
-        self._basis[index] = vector
-        self._weighted[index] = self.pencil.weights * vector
 
     def extend(self, dimension: int) -> None:
         """Apply S until the space has this dimension, or is invariant; orthogonalised twice, which is enough."""
@@ -128,7 +123,7 @@ class Krylov:
             self.applications += 1
             size, parts = self.pencil.size(image), np.zeros(j + 1)
             for _ in range(2):
-                more = self._weighted[: j + 1] @ image
+                more = self._basis[: j + 1] @ (self.pencil.weights * image)
                 image -= more @ self._basis[: j + 1]
                 parts += more
             rest = self.pencil.size(image)
@@ -138,7 +133,7 @@ class Krylov:
                 self.is_invariant = True
             else:
                 self._matrix[j + 1, j] = rest
-                self._keep(j + 1, image / rest)
+                self._basis[j + 1] = image / rest
 
     def ritz(self) -> Ritz:
         """The approximate eigenpairs that the space holds."""

@@ -14,7 +14,7 @@ import numpy as np
 from shapespace.analysis.controlled import ControlledProblem
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
-from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Border, Rate
+from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Actions, Border, Rate
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.study.engine import Engine
 from shapespace.study.scenario import Scenario
@@ -118,9 +118,9 @@ class KeyedProblem(AbstractSmoothProblem):
         bend = powers.bend(p, dp, ep)
         return direct + self.base.derivative(x, at, np.zeros_like(x), bend) if bend.any() else direct
 
-    def mass(self, x: Array, p: Array, dx: Array) -> Array:
+    def actions(self, x: Array, p: Array) -> Actions:
         """Of the base."""
-        return self.base.mass(x, self.powers.value(p), dx)
+        return self.base.actions(x, self.powers.value(p))
 
     def stored(self, x: Array, p: Array) -> Array:
         """Of the base."""
