@@ -1,8 +1,9 @@
 """A branch of stationary surfaces beside AUTO-07p: guided division at Pe = 450 (Fig. 7b), ring amplitude 0 to 4.2.
 
-Both start from the sphere on 60 elements of 4 Gauss points with the mesh moved along, and locate the folds. They differ in
-what they do besides: ours locates the branch points too; AUTO looks for none (peer_auto.py says why). Then ours with the leading growth rates at every point, which AUTO does not
-offer for boundary value problems, 100 points of Bratu's problem, and 40 points of the fold curve of Chan's problem with its cusp.
+Both start from the sphere on 60 elements of 4 Gauss points with the mesh moved along, and locate the folds. Ours locates
+the branch points too; AUTO looks for none (peer_auto.py says why). Then ours with the leading growth rates at every point,
+which AUTO does not offer for boundary value problems, 100 points of Bratu's problem, and 40 points of the fold curve of Chan's
+problem with its cusp.
 
 Times are processor time on one core, everything compiled, the better of two.
 Run from the root: python -m benchmarks.bench_branch   (about two minutes)
