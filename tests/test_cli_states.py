@@ -153,6 +153,10 @@ def test_curve_reports_points_of_two_keys(shell: Shell, sphere: str):
     steady = json.loads(shell("steady", *BRANCH[1:4], "--from", "forks:user-1", "--json").out)
     assert steady["parameters"]["turnover_rate"] == 9.5
     assert steady["parameters"]["peclet"] == pytest.approx(23.0)
+    onwards = ("--vary", "peclet", "--stop", "23.2", "--from", "forks:user-1", "--side", "1", "--no-stability")
+    side = json.loads(shell("branch", *BRANCH[1:4], *onwards, "--json", "--out", "side").out)
+    assert (side["outcome"], side["parameters"]["turnover_rate"]) == ("reached-stop", 9.5)
+    assert side["points"][0]["parameter"] == pytest.approx(23.0)
 
 
 @pytest.mark.parametrize(

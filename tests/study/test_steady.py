@@ -86,3 +86,14 @@ def test_the_divided_surface_is_where_division_ends():
     end = run(scenario("guided-division"))
     assert steady.observables["neck_radius"] == pytest.approx(end.observables["neck_radius"], rel=1e-6)
     assert abs(steady.observables["velocity"]) < 1e-9
+
+
+def test_every_solution_carries_its_errors():
+    """The estimated error of the discretisation below what was aimed at, and conditions that hold to round-off."""
+    case = scenario("polar-swimmer", elements=20, max_steps=3)
+    data = run(case).dataset
+    assert np.isnan(data.boundary_residual[0])  # the initial state is given, not solved for
+    for errors in (data.isel(time=slice(1, None)), solve_steady(case).observables):
+        assert (np.asarray(errors["discretisation_error"]) > 0.0).all()
+        assert (np.asarray(errors["discretisation_error"]) <= case.numerics.mesh_tolerance).all()
+        assert (np.asarray(errors["boundary_residual"]) < 1e-9).all()

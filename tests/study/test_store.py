@@ -17,6 +17,7 @@ from shapespace.base.errors import StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study import files
 from shapespace.study.frame import DAMAGE, Frame, decode_frame, encode_frame
+from shapespace.study.records import FORMAT_VERSION
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.store import RunStore
 
@@ -77,7 +78,7 @@ def test_frames_come_back_bit_for_bit(tmp_path: Path):
 def test_manifest_describes_itself(tmp_path: Path):
     fill(tmp_path / "run", outcome=Outcome.REACHED_END)
     manifest = json.loads((tmp_path / "run" / "store.json").read_text())
-    assert (manifest["format"], manifest["format_version"]) == ("shapespace-run", 1)
+    assert (manifest["format"], manifest["format_version"]) == ("shapespace-run", FORMAT_VERSION)
     assert (manifest["status"], manifest["outcome"], manifest["frames"]) == ("finished", "reached-end", 5)
     assert {"shapespace", "python", "jax", "numpy"} <= manifest["versions"].keys()
     assert manifest["units"]["velocity"] == "R0/tau"
@@ -258,7 +259,11 @@ def test_gap_swap_and_missing_folder_are_found(tmp_path: Path):
     ("old", "new", "part"),
     [
         ('"shapespace-run"', '"other"', "is not of a shapespace-run store"),
-        ('"format_version": 1', '"format_version": 2', "has format_version 2, this shapespace reads 1"),
+        (
+            f'"format_version": {FORMAT_VERSION}',
+            '"format_version": 1',
+            "was written by another version of shapespace (format_version 1,",
+        ),
         ('"frames": 5', '"frames": "many"', "is damaged (outcome or frames)"),
         ('"outcome": "reached-end"', '"outcome": "great"', "is damaged (outcome or frames)"),
         ('"status"', '"state"', "is damaged (no status)"),

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from shapespace.view.branch import _line, stretches
+from shapespace.view.branch import _line, stretches, telling_observable
 
 
 def step(n_unstable: int | None) -> SimpleNamespace:
@@ -48,3 +48,15 @@ def test_a_gap_is_left_where_the_observable_is_missing():
 
 def test_lines():
     assert [_line(step(n)) for n in (0, 2, None)] == ["-", "--", ":"]
+
+
+def test_along_an_observable_the_one_that_answers_is_drawn():
+    scenario = SimpleNamespace(model="open-membrane")
+    point = SimpleNamespace(observables={"height": 0.7, "pulling_force": 3.0, "bending_energy": 20.0})
+    for key, free, name in (
+        ("height", "pulling_force", "pulling_force"),
+        ("height", "coat_area", "bending_energy"),
+        ("coat_area", None, "height"),
+    ):
+        branch = SimpleNamespace(scenario=scenario, key=key, free=free, points=(point,))
+        assert telling_observable(branch) == name  # type: ignore[arg-type]

@@ -129,6 +129,8 @@ QUANTITIES: dict[str, Quantity] = {
     "energy_residual": Quantity("R_E", "rest of the energy law", _POWER),
     "amount": Quantity("M", "total amount of the stress regulator", Dimension(2, 0, 0, 1)),
     "amount_supply": Quantity("dM/dt", "exchange of regulator with the surroundings", Dimension(2, 0, -1, 1)),
+    "discretisation_error": Quantity("eps_u", "estimated error of the discretisation", _NUMBER),
+    "boundary_residual": Quantity("R_B", "residual of the boundary and integral conditions", _NUMBER),
     "max_meridional_curvature": Quantity("max |C_u^u|", "largest meridional curvature", _CURVATURE),
     "reduced_volume": Quantity("v", "reduced volume", _NUMBER),
     # fields along the curve

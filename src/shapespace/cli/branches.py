@@ -3,12 +3,12 @@
 import json
 import math
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from shapespace.base.errors import InputError
+from shapespace.cli.progress import ProgressDisplay, Way
 from shapespace.cli.shared import (
     GAVE_UP,
     INTERRUPTED,
@@ -74,30 +74,39 @@ def branch_command(
     """Follow a stationary state while one key changes, through folds; find and name the special points on the way."""
     from shapespace.study.branching import branch
     from shapespace.study.run import free_path
+    from shapespace.study.starts import find_start
 
     values = _read_places(at)
-    chosen = find_scenario(scenario).with_overrides(read_settings(settings))
+    changes = read_settings(settings)
+    chosen = find_scenario(scenario).with_overrides(changes)
+    if origin is not None:
+        chosen = find_start(origin).placing(chosen, {*changes, vary})
     name = f"{chosen.name}-{vary}"
     path = out or (Path("results") / name if resume else free_path(name))
-    display = _Display(vary)
+    way = Way(stop)
     try:
-        found = branch(
-            chosen,
-            vary,
-            stop,
-            start=start,
-            free=free,
-            at=values,
-            origin=origin,
-            state=state,
-            side=side,
-            both=both,
-            stability=not no_stability,
-            out=path,
-            resume=resume,
-            progress=display.update,
-            ready=lambda count: tell(f"continuing {path} after {count} points" if count else f"starting {path}"),
-        )
+        with ProgressDisplay() as display:
+            found = branch(
+                chosen,
+                vary,
+                stop,
+                start=start,
+                free=free,
+                at=values,
+                origin=origin,
+                state=state,
+                side=side,
+                both=both,
+                stability=not no_stability,
+                out=path,
+                resume=resume,
+                progress=lambda point, count: display.update(
+                    _described(vary, point, count), way.share(point.parameter), bool(point.label)
+                ),
+                ready=lambda count: display.start(
+                    f"continuing {path} after {count} points" if count else f"starting {path}"
+                ),
+            )
     except KeyboardInterrupt:
         tell(f"interrupted; to continue: {again(path)}")
         return INTERRUPTED
@@ -137,20 +146,11 @@ def _read_place(text: str) -> float | tuple[str, float]:
     return (name, float(value)) if equals else float(text)
 
 
-class _Display:
-    """Where a branch stands, on stderr: a line for special points, and one now and then."""
-
-    def __init__(self, key: str, seconds_between_lines: float = 5.0) -> None:
-        self._key, self._pause, self._told = key, seconds_between_lines, -math.inf
-
-    def update(self, point: "BranchPoint", count: int) -> None:
-        """Take note of a new point."""
-        now = monotonic()
-        if point.label or now - self._told >= self._pause:
-            self._told = now
-            growing = "" if point.n_unstable is None else f", n_unstable {point.n_unstable}"
-            began = f" from the state {point.began}" if point.began else ""
-            tell(f"{count} points, {self._key} = {point.parameter:.8g}{growing} {point.label}{began}".rstrip())
+def _described(key: str, point: "BranchPoint", count: int) -> str:
+    """A point in a line."""
+    growing = "" if point.n_unstable is None else f", n_unstable {point.n_unstable}"
+    began = f" from the state {point.began}" if point.began else ""
+    return f"{count} points, {key} = {point.parameter:.8g}{growing} {point.label}{began}".rstrip()
 
 
 def _record(found: "Branch") -> dict[str, Any]:

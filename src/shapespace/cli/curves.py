@@ -3,11 +3,11 @@
 import json
 import math
 from pathlib import Path
-from time import monotonic
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from shapespace.cli.progress import ProgressDisplay, Way
 from shapespace.cli.shared import (
     GAVE_UP,
     INTERRUPTED,
@@ -23,7 +23,7 @@ from shapespace.cli.shared import (
 )
 
 if TYPE_CHECKING:
-    from shapespace.study.curve_store import Curve, CurvePoint
+    from shapespace.study.curve_store import Curve
 
 
 @app.command(
@@ -64,19 +64,26 @@ def curve_command(
     known = find_start(origin)
     name = "-".join(filter(None, [known.scenario.name, known.key, vary]))
     path = out or (Path("results") / name if resume else free_path(name))
-    display = _Display()
+    keys, ways = (known.key or "", vary), (Way(stop), Way(start))
     try:
-        found = curve(
-            origin,
-            vary,
-            stop,
-            start=start,
-            at=values,
-            out=path,
-            resume=resume,
-            progress=lambda point, count: display.update(point, count, (known.key or "", vary)),
-            ready=lambda count: tell(f"continuing {path} after {count} points" if count else f"starting {path}"),
-        )
+        with ProgressDisplay() as display:
+            found = curve(
+                origin,
+                vary,
+                stop,
+                start=start,
+                at=values,
+                out=path,
+                resume=resume,
+                progress=lambda point, count: display.update(
+                    f"{count} points, {_at(keys, point.parameters.tolist())} {point.label}".rstrip(),
+                    ways[point.leg].share(float(point.parameters[1])),
+                    bool(point.label),
+                ),
+                ready=lambda count: display.start(
+                    f"continuing {path} after {count} points" if count else f"starting {path}"
+                ),
+            )
     except KeyboardInterrupt:
         tell(f"interrupted; to continue: {again(path)}")
         return INTERRUPTED
@@ -100,20 +107,6 @@ def _report(found: "Curve") -> int:
 
 def _at(keys: tuple[str, str], values: "list[float]") -> str:
     return ", ".join(f"{key} = {value:.8g}" for key, value in zip(keys, values, strict=True))
-
-
-class _Display:
-    """Where a curve stands, on stderr: a line for special points, and one now and then."""
-
-    def __init__(self, seconds_between_lines: float = 5.0) -> None:
-        self._pause, self._told = seconds_between_lines, -math.inf
-
-    def update(self, point: "CurvePoint", count: int, keys: tuple[str, str]) -> None:
-        """Take note of a new point."""
-        now = monotonic()
-        if point.label or now - self._told >= self._pause:
-            self._told = now
-            tell(f"{count} points, {_at(keys, point.parameters.tolist())} {point.label}".rstrip())
 
 
 def _record(found: "Curve") -> dict[str, Any]:

@@ -1,16 +1,14 @@
 """Commands about scenarios and their dynamics: `scenarios`, `config`, `run`."""
 
 import json
-import math
 import shlex
 from pathlib import Path
-from time import monotonic
-from types import TracebackType
-from typing import TYPE_CHECKING, Annotated, Self
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
 from shapespace.base.errors import InputError
+from shapespace.cli.progress import ProgressDisplay
 from shapespace.cli.shared import (
     GAVE_UP,
     INTERRUPTED,
@@ -29,9 +27,6 @@ from shapespace.cli.shared import (
 )
 
 if TYPE_CHECKING:
-    from rich.progress import Progress
-
-    from shapespace.study.frame import Frame
     from shapespace.study.run import Run
 
 
@@ -87,14 +82,27 @@ def run_command(
     as_json: AsJson = False,
 ) -> int:
     """Simulate a scenario; every time step is stored, so that a run can be stopped at any moment and resumed."""
+    from shapespace.study.pace import Pace
     from shapespace.study.run import free_path, run
 
     changes = read_settings([*settings, *(f"{k}={v}" for k, v in (("until", until), ("dt", dt)) if v is not None)])
     chosen = chosen_scenario(scenario, changes, start)
     path = out or (Path("results") / chosen.name if resume else free_path(chosen.name))
+    title, pace = f"{chosen.name} in {path}", Pace(chosen.run.until)
     try:
-        with ProgressDisplay(chosen.run.until, f"{chosen.name} in {path}") as display:
-            result = run(chosen, out=path, resume=resume, start=start, progress=display.update, ready=display.start)
+        with ProgressDisplay() as display:
+            result = run(
+                chosen,
+                out=path,
+                resume=resume,
+                start=start,
+                progress=lambda frame, steps: display.update(
+                    pace.describe(frame, steps), frame.time / chosen.run.until
+                ),
+                ready=lambda count: display.start(
+                    f"continuing {title} after {count} frames" if count else f"starting {title}"
+                ),
+            )
     except KeyboardInterrupt:
         options = [word for key, value in changes.items() for word in ("-s", f"{key}={value}")]
         options += ["--from", start] if start is not None else []
@@ -106,52 +114,6 @@ def run_command(
         return 0
     tell(f"the solver gave up ({result.outcome}): {result.outcome.advice} The partial run is in {result.store}.")
     return GAVE_UP
-
-
-class ProgressDisplay:
-    """Where a run stands, on stderr: a bar with an ETA on a terminal, else a plain line now and then."""
-
-    def __init__(self, until: float, title: str, seconds_between_lines: float = 5.0) -> None:
-        from shapespace.study.pace import Pace
-
-        self._until = until
-        self._title = title
-        self._pause = seconds_between_lines
-        self._pace = Pace(until)
-        self._bar: Progress | None = None
-        self._told = -math.inf
-
-    def __enter__(self) -> Self:
-        return self
-
-    def start(self, frames: int) -> None:
-        """Appear: the input was good, and the store has so many frames already."""
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn
-
-        tell(f"continuing {self._title} after {frames} frames" if frames else f"starting {self._title}")
-        console = Console(stderr=True)
-        if console.is_terminal:
-            columns = [TextColumn("{task.percentage:>3.0f} %"), BarColumn(20), TextColumn("{task.description}")]
-            self._bar = Progress(*columns, console=console, transient=True)
-            self._bar.add_task("preparing ...", total=self._until)
-            self._bar.start()
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        if self._bar is not None:
-            self._bar.stop()
-
-    def update(self, frame: "Frame", steps: int) -> None:
-        """Take note of a new frame."""
-        text = self._pace.describe(frame, steps)
-        if self._bar is not None:
-            task = self._bar.task_ids[0]
-            self._bar.update(task, completed=min(frame.time, self._until), description=text)
-        elif (now := monotonic()) - self._told >= self._pause:
-            self._told = now
-            tell(f"{100 * min(frame.time / self._until, 1):.0f} %: {text}")
 
 
 def _record(run: "Run") -> dict[str, object]:

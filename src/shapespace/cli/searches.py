@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from shapespace.cli.progress import ProgressDisplay
 from shapespace.cli.shared import (
     GAVE_UP,
     INTERRUPTED,
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 
 SHOWN = ("height", "neck_radius", "velocity")
 """Observables by which states are told apart at a glance; all are in the store."""
-TOLD = 25
-"""Starts between lines that say how far a search is."""
 
 
 @app.command(
@@ -70,15 +69,18 @@ def search_command(
     name = f"{chosen.name}-states"
     path = out or (Path("results") / name if resume else free_path(name))
     try:
-        found = search_states(
-            chosen,
-            origins=origins,
-            max_tries=starts,
-            out=path,
-            resume=resume,
-            progress=_tell,
-            ready=lambda count: tell(f"continuing {path} after {count} starts" if count else f"starting {path}"),
-        )
+        with ProgressDisplay() as display:
+            found = search_states(
+                chosen,
+                origins=origins,
+                max_tries=starts,
+                out=path,
+                resume=resume,
+                progress=lambda one: display.update(_described(one), is_notable=bool(one.label)),
+                ready=lambda count: display.start(
+                    f"continuing {path} after {count} starts" if count else f"starting {path}"
+                ),
+            )
     except KeyboardInterrupt:
         tell(f"interrupted; to continue: {again(path)}")
         return INTERRUPTED
@@ -93,11 +95,10 @@ def search_command(
     return 0
 
 
-def _tell(one: "Tried") -> None:
-    """A line on stderr for each new state, and one now and then."""
-    if one.label or (one.place + 1) % TOLD == 0:
-        growing = "" if one.n_unstable is None else f", n_unstable {one.n_unstable}"
-        tell(f"start {one.place + 1} ({one.start}): {one.label or one.outcome}{growing}")
+def _described(one: "Tried") -> str:
+    """A try in a line."""
+    growing = "" if one.n_unstable is None else f", n_unstable {one.n_unstable}"
+    return f"start {one.place + 1} ({one.start}): {one.label or one.outcome}{growing}"
 
 
 def _record(found: "Search") -> dict[str, Any]:

@@ -13,6 +13,8 @@ from cyclopts import App, Parameter
 from shapespace.base.errors import InputError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from shapespace.base.outcome import Outcome
     from shapespace.study.scenario import Scenario
 
@@ -136,13 +138,14 @@ def finite(values: Mapping[str, float]) -> dict[str, float]:
     return {name: value for name, value in values.items() if math.isfinite(value)}
 
 
-def print_lines(*lines: object) -> None:
+def print_lines(*lines: "Table | str") -> None:
     """Text and tables on stdout."""
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=True, markup=False)
     for line in lines:
-        console.print(line)
+        # A table wider than the terminal is wrapped by it, which loses nothing; Rich would cut off words.
+        console.print(line, width=max(console.width, console.measure(line).maximum))
 
 
 def print_observables(scenario: "Scenario", observables: Mapping[str, float]) -> None:

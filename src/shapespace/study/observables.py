@@ -6,6 +6,7 @@ from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.geometry.contact import crosses_itself
+from shapespace.numerics.adaptation import discretisation_error
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.state import State
 from shapespace.physics.term import CHANNELS
@@ -42,6 +43,10 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
         **{name: integrals[name] for name in ("area", "bending_energy", "energy")},
         **_powers(engine, integrals, first, last),
     }
+    out |= {
+        "discretisation_error": discretisation_error(state),
+        "boundary_residual": _boundary_residual(engine, x, rate),
+    }
     radius = neck_radius(state, column["r"])
     if radius is not None:
         out["neck_radius"] = radius
@@ -67,6 +72,13 @@ def energy_law(values: dict[str, float], rate: float) -> dict[str, float]:
     """dF/dt, and what it leaves of the energy law: dF/dt + 2 D - external - chemical power."""
     supply = values["external_power"] + values.get("chemical_power", 0.0)
     return {"energy_rate": rate, "energy_residual": rate + values["dissipation"] - supply}
+
+
+def _boundary_residual(engine: Engine, x: Array, rate: Rate) -> float:
+    """By how much the worst of the end conditions and the integral conditions is missed."""
+    # As many as there are fields and scalars; they come last.
+    conditions = len(engine.system.fields) + len(engine.system.scalars)
+    return float(np.abs(engine.problem.residual(x, engine.p, rate)[-conditions:]).max())
 
 
 def _closed(

@@ -28,7 +28,8 @@ from shapespace.study.files import acquire_lock, storage, sync_directory, write_
 from shapespace.study.frame import DAMAGE
 from shapespace.study.scenario import Scenario
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
+"""To be raised with every change of what is stored, of records too: others are not read."""
 
 _MANIFEST = "store.json"
 _LOCK = "lock"
@@ -303,8 +304,8 @@ class AbstractRecordStore(ABC, Generic[R]):
             raise StoreError(f"{file}: is not of a {_FORMAT}{cls.noun} store; give a directory that {made}.")
         if manifest.get("format_version") != FORMAT_VERSION:
             raise StoreError(
-                f"{file}: has format_version {manifest.get('format_version')}, this shapespace reads {FORMAT_VERSION}; "
-                "use the shapespace that wrote it."
+                f"{file}: was written by another version of shapespace (format_version {manifest.get('format_version')}, this "
+                f"one reads {FORMAT_VERSION}); use that version, or {cls.noun} again with another --out."
             )
         missing = {"created", "versions", "scenario", "outcome", cls.folder, "resumed", "status"} - manifest.keys()
         if missing:

@@ -18,6 +18,9 @@ from shapespace.study.scenario import Scenario
 ORDER = 3
 """Of the adaptive method; against 2 it needs a third fewer steps at the same tolerance, and is no less stable here."""
 
+_OF_A_STEP = (*FLOWS, "boundary_residual")
+"""Observables that a state has only where it was solved for."""
+
 
 class Simulation:
     """Iterate for the frames of a scenario; afterwards `outcome` says why they ended.
@@ -76,7 +79,7 @@ class Simulation:
         values = measure(engine, moment.x, rate)
         values |= self._energy_law(moment.time, values)
         if resting:
-            values = {name: value for name, value in values.items() if name not in FLOWS}
+            values = {name: value for name, value in values.items() if name not in _OF_A_STEP}
         state, scales = problem.unpack(moment.x), self.scenario.scales
         return Frame(
             time=moment.time * scales.factor("time"),

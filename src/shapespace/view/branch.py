@@ -50,8 +50,10 @@ def plot_branch(branch: Branch, observable: str | None = None) -> Figure:
 
 
 def telling_observable(branch: Branch) -> str:
-    """The first of TELLING that changes along the branch."""
-    names = TELLING[branch.scenario.model]
+    """What answers along a branch in an observable, else the first of TELLING that changes."""
+    if branch.free in branch.points[0].observables:
+        return str(branch.free)
+    names = [name for name in TELLING[branch.scenario.model] if name != branch.key] or ["bending_energy"]
     for name in names:
         if np.ptp([point.observables[name] for point in branch.points]) > LEAST_CHANGE:
             return name
