@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from shapespace.base.errors import InputError
+from shapespace.base.outcome import Outcome
 from shapespace.cli.progress import ProgressDisplay, Way
 from shapespace.cli.shared import (
     GAVE_UP,
@@ -114,11 +115,17 @@ def branch_command(
         print(json.dumps(_record(found), allow_nan=False))
     else:
         _summarise(found)
-    return _report(found)
+    return _report(found, stability=not no_stability)
 
 
-def _report(found: "Branch") -> int:
+def _report(found: "Branch", stability: bool) -> int:
     """Say on stderr what was missed or went wrong; the exit status."""
+    unknown = [point.parameter for point in found.points if point.is_step and point.n_unstable is None]
+    if stability and unknown:
+        tell(
+            f"the growth rates of {len(unknown)} points are not known, the first at {found.key} = {unknown[0]:.8g} "
+            f"({Outcome.EIGENVALUES_UNCONVERGED}): {Outcome.EIGENVALUES_UNCONVERGED.advice}"
+        )
     for one in found.missed:
         tell(
             f"a {one['kind']} between {found.key} = {one['parameter_before']:.8g} and {one['parameter_after']:.8g} was not "
