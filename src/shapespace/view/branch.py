@@ -15,6 +15,7 @@ from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import Branch
 from shapespace.study.scenario import Scenario
 from shapespace.view import style
+from shapespace.view.labels import label_points
 
 TELLING = {
     "open-membrane": ("height",),
@@ -46,6 +47,7 @@ def plot_branch(branch: Branch, observable: str | None = None) -> Figure:
         axes.set_xlabel(quantity_label(branch.scenario, branch.key))
         axes.set_ylabel(quantity_label(branch.scenario, name))
         axes.legend(handles=_legend(lines), loc="best")
+        label_points(axes, [(one.label, one.parameter, one.observables[name]) for one in specials if one.kind != "end"])
     return figure
 
 
@@ -103,13 +105,9 @@ def _line(point: BranchPoint) -> str:
 
 
 def _draw_specials(axes: Axes, points: Sequence[BranchPoint], name: str) -> None:
-    for number, point in enumerate(points):
+    for point in points:
         mark = MARKS.get(point.kind, "X")
-        x, y = point.parameter, point.observables[name]
-        axes.plot(x, y, mark, color=style.RED, markersize=4.0, zorder=3)
-        if point.kind != "end":
-            offset = (5, 5 if number % 2 == 0 else -9)
-            axes.annotate(point.label, (x, y), offset, textcoords="offset points", fontsize=6.5)
+        axes.plot(point.parameter, point.observables[name], mark, color=style.RED, markersize=4.0, zorder=3)
 
 
 def quantity_label(scenario: Scenario, name: str) -> str:

@@ -13,6 +13,7 @@ from shapespace.study.curve_store import Curve, CurvePoint
 from shapespace.study.frame import Array
 from shapespace.view import style
 from shapespace.view.branch import quantity_label
+from shapespace.view.labels import label_points
 
 COLOURS = {"fold": style.BLUE, "pitchfork": style.PURPLE}
 MARKS = {
@@ -44,6 +45,7 @@ def plot_curve(curve: Curve) -> Figure:
         axes.set_xlabel(quantity_label(curve.scenario, curve.keys[0]))
         axes.set_ylabel(quantity_label(curve.scenario, curve.keys[1]))
         axes.legend(loc="best")
+        label_points(axes, [(one.label, *one.parameters) for one in curve.special_points if one.kind != "end"])
     return figure
 
 
@@ -62,6 +64,3 @@ def _mark(axes: Axes, points: Sequence[CurvePoint]) -> None:
     for point in points:
         x, y = point.parameters
         axes.plot(x, y, MARKS.get(point.kind, "X"), color=style.RED, markersize=4.0, zorder=3)
-        if point.kind != "end":
-            offset = (6, -9 if point.slope.prod() > 0.0 else 4)  # beside the line, right of it
-            axes.annotate(point.label, (x, y), offset, textcoords="offset points", fontsize=6.5)
