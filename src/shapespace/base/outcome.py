@@ -90,7 +90,7 @@ _ADVICE = {
     Outcome.OUT_OF_RANGE: "The curve leaves the values that a key can take.",
     Outcome.UNFOLDED: "The branches part when this key changes, and cross at single values only: choose another key.",
     Outcome.MAX_STARTS: "The limit on starts was reached with others left: raise `--starts` and resume.",
-    Outcome.MAX_STEPS: "The step limit was reached: raise `max_steps` or resume.",
+    Outcome.MAX_STEPS: "The step limit was reached: resume, of a run with a larger `max_steps`.",
     Outcome.EIGENVALUES_UNCONVERGED: (
         "The leading growth rates did not converge or contradict each other: raise `elements`, or ask for fewer."
     ),

@@ -1,0 +1,22 @@
+"""Surfaces that are not well posed are refused, and told what is missing."""
+
+import pytest
+
+from shapespace.variational.ends import Free, Pinned, check_count, check_ends
+
+
+def test_conditions_that_are_missing_or_surplus_are_counted_and_listed():
+    ends, integrals = ["r(0)", "r(1)", "z(1)"], ["volume"]
+    check_count(3, ("p",), ends, integrals)
+    with pytest.raises(ValueError, match=r"1 condition\(s\) missing: 3 fields and the scalars .*'volume'") as caught:
+        check_count(3, ("h", "p"), ends, integrals)
+    assert "pressure -> volume" in str(caught.value)
+    with pytest.raises(ValueError, match=r"2 condition\(s\) surplus"):
+        check_count(2, (), ends, integrals)
+
+
+def test_rates_without_ends_and_ends_without_rates_are_named():
+    both = (Pinned(), Free())
+    check_ends({"r": both, "z": both}, ("r", "z"))
+    with pytest.raises(ValueError, match=r"missing \['z'\], surplus \['psi'\]"):
+        check_ends({"r": both, "psi": both}, ("r", "z"))
