@@ -72,8 +72,16 @@ def test_a_term_can_be_added_as_the_page_says():
     run_blocks(ROOT / "docs" / "how-to" / "add-a-term.md")
 
 
+@pytest.mark.usefixtures("short")
+def test_a_map_is_read_as_the_page_says():
+    axes = ("peclet=20:26:2", "inverse_hydrodynamic_length=1:2:2")
+    store = ss.diagram(ss.scenario("polar-swimmer"), *axes, out="map", workers=1).store
+    names = run_blocks(ROOT / "docs" / "how-to" / "map-shape-space.md", {"store": store})
+    assert names["found"].converged == 2
+
+
 def test_every_python_block_is_run():
-    run = {"README.md", "file-format.md", "add-a-term.md"}
+    run = {"README.md", "file-format.md", "add-a-term.md", "map-shape-space.md"}
     assert {page.name for page in PAGES if blocks(page, "python")} == run
 
 
@@ -107,6 +115,7 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
         "branch_command",
         "curve_command",
         "search_command",
+        "diagram_command",
         "plot",
         "movie",
         "export",

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from shapespace.study.curve_store import open_curve as open_curve
     from shapespace.study.curves import curve as curve
     from shapespace.study.dataset import open_dataset as open_dataset
+    from shapespace.study.diagram_store import Diagram as Diagram
+    from shapespace.study.diagram_store import open_diagram as open_diagram
+    from shapespace.study.diagrams import diagram as diagram
     from shapespace.study.run import Run as Run
     from shapespace.study.run import run as run
     from shapespace.study.scenario import Scenario as Scenario
@@ -47,6 +50,9 @@ _HOMES = {
     "open_curve": "study.curve_store",
     "curve": "study.curves",
     "branch": "study.branching",
+    "Diagram": "study.diagram_store",
+    "diagram": "study.diagrams",
+    "open_diagram": "study.diagram_store",
     "open_dataset": "study.dataset",
     "Run": "study.run",
     "run": "study.run",

@@ -13,3 +13,7 @@ class InputError(ValueError):
 
 class StoreError(InputError):
     """A directory or file that is foreign, damaged, of another run or not writable, or a full disk."""
+
+
+class WorkerError(RuntimeError):
+    """Processes that compute could not be kept alive; what they finished is stored."""

@@ -29,6 +29,7 @@ class Outcome(StrEnum):
     OUT_OF_RANGE = "out-of-range"
     UNFOLDED = "unfolded"
     MAX_STARTS = "max-starts"
+    COMPLETE = "complete"
     EIGENVALUES_UNCONVERGED = "eigenvalues-unconverged"
 
     @property
@@ -55,6 +56,7 @@ _SUCCESS = {
     Outcome.REJOINED,
     Outcome.OUT_OF_RANGE,
     Outcome.MAX_STARTS,
+    Outcome.COMPLETE,
 }
 
 _ADVICE = {
@@ -91,6 +93,7 @@ _ADVICE = {
     Outcome.UNFOLDED: "The branches part when this key changes, and cross at single values only: choose another key.",
     Outcome.MAX_STARTS: "The limit on starts was reached with others left: raise `--starts` and resume.",
     Outcome.MAX_STEPS: "The step limit was reached: resume, of a run with a larger `max_steps`.",
+    Outcome.COMPLETE: "Every point of the grid was tried; those without a state say why.",
     Outcome.EIGENVALUES_UNCONVERGED: (
         "The leading growth rates did not converge or contradict each other: raise `elements`, or ask for fewer."
     ),

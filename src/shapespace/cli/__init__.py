@@ -18,6 +18,7 @@ from shapespace.cli import states as states  # isort: skip
 from shapespace.cli import branches as branches  # isort: skip
 from shapespace.cli import curves as curves  # isort: skip
 from shapespace.cli import searches as searches  # isort: skip
+from shapespace.cli import diagrams as diagrams  # isort: skip
 from shapespace.cli import pictures as pictures  # isort: skip
 from shapespace.cli import checking as checking  # isort: skip
 from shapespace.cli.shared import BAD_INPUT, INTERRUPTED, app, tell

@@ -32,23 +32,29 @@ def plot(
         bool, Parameter(help="Of a run or a state: energy, dissipation by channel and what supplies it (budget.png).")
     ] = False,
     observable: Annotated[
-        str | None, Parameter(metavar="NAME", help="Of a branch: what to draw against the key that varies.")
+        str | None,
+        Parameter(
+            name=["--observable", "--of"],
+            metavar="NAME",
+            help="Of a branch: what to draw against the key that varies; of a diagram: what to map.",
+        ),
     ] = None,
 ) -> None:
     """Draw what is stored.
 
     Of a run a curve over time, snapshots of the surface, profiles of velocity and curvature; of a branch an observable
     against the key that varies, solid where it is stable, with its special points; of a curve the plane of its two keys; of
-    a mode the state displaced by it, the velocity of that motion, and profiles along the curve; with --budget what goes into
-    energy and heat, what supplies it, and what the energy law leaves over.
+    a diagram a map of an observable over that plane; of a mode the state displaced by it, the velocity of that motion, and
+    profiles along the curve; with --budget what goes into energy and heat, what supplies it, and what the energy law leaves
+    over.
     """
     from shapespace.study.files import replacing
     from shapespace.study.records import noun_of
 
     path, name = Path(store), "figure.png"
     noun = noun_of(path)
-    if observable is not None and (noun != "branch" or mode is not None):
-        raise InputError(f"--observable {observable}: is for the figure of a branch; leave it away.")
+    if observable is not None and (noun not in ("branch", "diagram") or mode is not None):
+        raise InputError(f"--observable {observable}: is for the figure of a branch or a diagram; leave it away.")
     if budget and (noun not in (None, "run") or mode is not None):
         raise InputError("--budget: is for the figure of a run or of a state that `steady` stored; leave it away.")
     if mode is not None:
@@ -63,6 +69,11 @@ def plot(
         from shapespace.view.curve import plot_curve
 
         figure = plot_curve(open_curve(path))
+    elif noun == "diagram":
+        from shapespace.study.diagram_store import open_diagram
+        from shapespace.view.diagram import plot_diagram
+
+        figure = plot_diagram(open_diagram(path), observable)
     elif noun == "branch":
         from shapespace.study.branch_store import open_branch
         from shapespace.view.branch import plot_branch

@@ -148,8 +148,10 @@ def shape_end(problem: CollocationProblem, x: Array) -> Outcome | None:
         return values[:, r], values[:, z]
 
     radii, heights = outline(u)
-    # An outline that only falls and stays on its side of the axis cannot cross itself.
-    if (np.diff(heights) < 0.0).all() and radii.min() >= 0.0:
+    # An outline on its side of the axis cannot cross itself where it only falls, or turns only one way around a point.
+    middle = 0.5 * (heights[0] + heights[-1])
+    turns = radii[1:] * (heights[:-1] - middle) - radii[:-1] * (heights[1:] - middle)
+    if radii[1:-1].min() > 0.0 and ((np.diff(heights) < 0.0).all() or (turns > 0.0).all()):
         return None
     return Outcome.SELF_INTERSECTING if crosses_itself(outline, u) else None
 

@@ -1,4 +1,4 @@
-"""Pictures of runs, branches and curves, stored or in memory: what `ss.plot` and `ss.movie` do."""
+"""Pictures of runs, branches, curves and diagrams, stored or in memory: what `ss.plot` and `ss.movie` do."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -11,11 +11,13 @@ from shapespace.base.errors import InputError
 from shapespace.study.branch_store import Branch, open_branch
 from shapespace.study.curve_store import Curve, open_curve
 from shapespace.study.dataset import open_dataset
+from shapespace.study.diagram_store import Diagram, open_diagram
 from shapespace.study.modes import find_modes
 from shapespace.study.records import noun_of
 from shapespace.view.branch import plot_branch
 from shapespace.view.budget import plot_budget
 from shapespace.view.curve import plot_curve
+from shapespace.view.diagram import plot_diagram
 from shapespace.view.figure import plot_run
 from shapespace.view.mode import plot_mode
 from shapespace.view.movie import save_movie
@@ -39,25 +41,37 @@ def _dataset_of(source: Source) -> xr.Dataset:
     return open_dataset(source) if isinstance(source, str | Path) else source.dataset
 
 
-def _figure(source: Source | Branch | Curve) -> Figure:
-    if isinstance(source, str | Path):
-        noun = noun_of(source)
-        source = open_branch(source) if noun == "branch" else open_curve(source) if noun == "curve" else source
+_OPENED: dict[str, Callable[[str | Path], Branch | Curve | Diagram]] = {
+    "branch": open_branch,
+    "curve": open_curve,
+    "diagram": open_diagram,
+}
+
+
+def _figure(source: Source | Branch | Curve | Diagram) -> Figure:
+    if isinstance(source, str | Path) and (noun := noun_of(source)) in _OPENED:
+        source = _OPENED[noun](source)
     if isinstance(source, Branch):
         return plot_branch(source)
+    if isinstance(source, Diagram):
+        return plot_diagram(source)
     return plot_curve(source) if isinstance(source, Curve) else plot_run(_dataset_of(source))
 
 
 def plot(
-    source: Source | Branch | Curve, out: str | Path | None = None, *, mode: int | None = None, budget: bool = False
+    source: Source | Branch | Curve | Diagram,
+    out: str | Path | None = None,
+    *,
+    mode: int | None = None,
+    budget: bool = False,
 ) -> Figure:
-    """The figure of a run, a branch or a curve, stored or not; also written to `out` (.png, .pdf, .svg) if given.
+    """The figure of a run, a branch, a curve or a diagram, stored or not; also written to `out` (.png, .pdf, .svg) if given.
 
     mode: number of a mode of a stored state to draw instead, `source` being `DIR:LABEL` of a branch or `DIR` of a state.
     budget: of a run or a state, what goes into energy and heat and what supplies it.
     """
     if budget:
-        if mode is not None or isinstance(source, Branch | Curve):
+        if mode is not None or isinstance(source, Branch | Curve | Diagram):
             raise InputError("budget = True: is for the figure of a run or of a stored state; leave it away.")
         figure = plot_budget(_dataset_of(source))
     elif mode is None:

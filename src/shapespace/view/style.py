@@ -79,6 +79,13 @@ def regulator_map() -> Colormap:
 
 
 @cache
+def signed_map() -> Colormap:
+    """Orange over white to blue, equally dark at both ends: told apart by those who do not tell red from green."""
+    stops = ["#8A4B00", "#E07B00", "#F6C58A", "#F7F7F7", "#9DC3E0", "#0067A5", "#00395C"]
+    return LinearSegmentedColormap.from_list("shapespace_signed", stops, N=512)
+
+
+@cache
 def coat_map() -> Colormap:
     """Bare membrane (grey) to fully coated (yellow)."""
     return LinearSegmentedColormap.from_list("shapespace_coat", [MEMBRANE, COAT], N=256)

@@ -1,0 +1,195 @@
+"""Stationary states on a grid of parameters, each found from those beside it.
+
+A point's guess extrapolates the states already found on the longest straight run of neighbours,
+
+    x_0 = sum_(i <= m) (-1)^(i+1) C(m, i) x_(-i),   m <= 4,
+
+which misses by the m-th difference of x; Newton's method then starts with the factors of the point before. Which points
+are tried in which order depends on the grid and on what exists there, never on time or on other grids.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from shapespace.analysis.stationary import LARGEST_MISS, Stationary, step_to
+from shapespace.base.arrays import Array
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import AbstractContinuableProblem, AbstractLinearisation, AbstractSmoothProblem, Rate
+from shapespace.numerics.newton import Newton, solve_root
+
+Index = tuple[int, int]
+
+WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0), (4.0, -6.0, 4.0, -1.0))
+"""Of the nearest neighbour, the next one and so on, by their number."""
+SIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
+SWEEP_NEWTON = Newton(max_iterations=12, min_damping=0.25)
+"""A guess that needs more patience is replaced by shorter steps."""
+SHORTEST = 1.0 / 16.0
+"""Of the way between neighbours that is worth a step: more often than not there is no state beyond."""
+NOTABLE = 1e-2
+"""A state that misses its guess by more is looked at: it may be one that the symmetry distinguishes."""
+SYMMETRIC = 1e-6
+"""States that differ less from their mirror image are their own."""
+MAX_MOVES = 6
+MAX_TRIES = 2
+
+
+@dataclass
+class Sweep:
+    """The states found so far on a grid. values (n_0, n_1, m): parameters. reasons: why there is none, where one was tried."""
+
+    values: Array
+    found: dict[Index, Stationary] = field(default_factory=dict)
+    reasons: dict[Index, Outcome] = field(default_factory=dict)
+    newton: Newton = SWEEP_NEWTON
+    _tries: dict[Index, int] = field(default_factory=dict)
+    _neighbours: dict[Index, int] = field(default_factory=dict)
+    _factors: tuple[AbstractContinuableProblem, AbstractLinearisation] | None = None
+    _still: tuple[AbstractContinuableProblem, Rate] | None = None
+
+    def p(self, at: Index) -> Array:
+        """Parameters (m,) of a point."""
+        return np.asarray(self.values[at])
+
+    @property
+    def missing(self) -> list[Index]:
+        """Points without a state."""
+        return [at for at in np.ndindex(*self.values.shape[:2]) if at not in self.found]
+
+    def begin(self, at: Index, state: Stationary) -> bool:
+        """Take a state, stepping from its own parameters to those of a point; False where that fails."""
+        there = state
+        if not np.array_equal(state.p, self.p(at)):
+            there = step_to(state, self.p(at), self.newton, SHORTEST)
+            if not there.outcome.is_success or not _is_like(there, state):
+                return False
+        self.found[at] = there
+        return True
+
+    def spread(self, start: Index) -> None:
+        """Find the states at all points that can be come to from the known ones, line by line from `start` on."""
+        order = list(_lines(start, self.values.shape[:2]))
+        grows = True
+        while grows:
+            grows = False
+            for at in order:
+                if at in self.found or not self._is_worth(at):
+                    continue
+                state = self._solved(at)
+                if state is not None:
+                    self.found[at] = state
+                    grows = True
+
+    def _is_worth(self, at: Index) -> bool:
+        """Whether more neighbours are known than when the point was last tried."""
+        known = len(self._known(at))
+        if known <= self._neighbours.get(at, 0) or self._tries.get(at, 0) >= MAX_TRIES:
+            return False
+        self._neighbours[at], self._tries[at] = known, self._tries.get(at, 0) + 1
+        return True
+
+    def _known(self, at: Index) -> list[Index]:
+        """Solved neighbours."""
+        return [one for one in ((at[0] + i, at[1] + j) for i, j in SIDES) if one in self.found]
+
+    def _solved(self, at: Index) -> Stationary | None:
+        """By the best extrapolation, by a line through two neighbours, and by short steps from neighbours."""
+        run = max((self._run(at, side) for side in SIDES), key=len)
+        for known in (run, run[:2]) if len(run) > 2 else (run,):
+            state = self._extrapolated(at, known)
+            if state is not None:
+                return state
+        for one in self._known(at)[:2]:
+            state = step_to(self.found[one], self.p(at), self.newton, SHORTEST)
+            if not state.outcome.is_success:
+                self.reasons[at] = state.outcome
+            elif _is_like(state, self.found[one]):
+                return state
+            else:
+                self.reasons[at] = Outcome.NO_STATE
+        return None
+
+    def _run(self, at: Index, side: Index) -> list[Index]:
+        """Known points in a row from here, the nearest first, as many as there are weights."""
+        run: list[Index] = []
+        for m in range(1, len(WEIGHTS) + 1):
+            one = (at[0] + m * side[0], at[1] + m * side[1])
+            if one not in self.found:
+                break
+            run.append(one)
+        return run
+
+    def _extrapolated(self, at: Index, run: list[Index]) -> Stationary | None:
+        problem = self.found[run[0]].problem
+        xs = [self._on(problem, one) for one in run]
+        guess = sum((w * x for w, x in zip(WEIGHTS[len(run) - 1], xs, strict=True)), np.zeros_like(xs[0]))
+        state = self._newton(problem, guess, self.p(at))
+        if state.outcome is not Outcome.CONVERGED:
+            self.reasons[at] = state.outcome
+            return None
+        x = state.x if state.problem is problem else state.problem.carried(state.x, problem)
+        miss = problem.norm(x - guess, guess)
+        if miss <= NOTABLE or (miss <= LARGEST_MISS and _is_like(state, self.found[run[0]])):
+            return state
+        self.reasons[at] = Outcome.NO_STATE
+        return None
+
+    def _on(self, problem: AbstractContinuableProblem, at: Index) -> Array:
+        """A known state on the discretisation of a problem, where it then stays."""
+        state = self.found[at]
+        return state.x if state.problem is problem else state.problem.carried(state.x, problem)
+
+    def _rest(self, problem: AbstractContinuableProblem, x: Array, p: Array) -> Rate:
+        """No motion: no more than a vector of zeros, whose length the discretisation tells."""
+        if self._still is None or self._still[0] is not problem:
+            self._still = (problem, Rate.of_growth(problem.stored(x, p)))
+        return self._still[1]
+
+    def _newton(self, problem: AbstractContinuableProblem, x: Array, p: Array) -> Stationary:
+        """Newton's method with the last factors, on better discretisations where the first is not good enough."""
+        iterations = 0
+        for move in range(MAX_MOVES + 1):
+            rate = self._rest(problem, x, p)
+            factors = self._factors[1] if self._factors is not None and self._factors[0] is problem else None
+            root = solve_root(problem, x, p, rate, self.newton, factors)
+            iterations += root.iterations
+            if root.linearisation is not None:
+                self._factors = (problem, root.linearisation)
+            better = problem.adapted(root.x) if root.outcome is Outcome.CONVERGED and move < MAX_MOVES else problem
+            if better is problem:
+                break
+            assert isinstance(better, AbstractContinuableProblem)
+            x, problem = problem.carried(root.x, better), better
+        return Stationary(problem, root.x, p, root.outcome, root.correction, np.nan, iterations, move < MAX_MOVES)
+
+
+def _is_like(state: Stationary, other: Stationary) -> bool:
+    """Whether both are their own mirror images, or neither is and the first is nearer to the second than to its image."""
+    problem, image = state.problem, _image(state)
+    if image is None:
+        return True
+    reference = _image(other)
+    assert reference is not None
+    is_own = problem.norm(image - state.x, state.x) < SYMMETRIC
+    if is_own != (other.problem.norm(reference - other.x, other.x) < SYMMETRIC):
+        return False
+    before = other.problem.carried(other.x, problem)
+    return is_own or problem.norm(state.x - before, before) <= problem.norm(image - before, before)
+
+
+def _image(state: Stationary) -> Array | None:
+    return state.problem.reflected(state.x) if isinstance(state.problem, AbstractSmoothProblem) else None
+
+
+def _lines(start: Index, shape: tuple[int, ...]) -> Iterator[Index]:
+    """All points: the column of the start outwards from it, each followed by its row outwards from that column."""
+    for j in _outwards(start[1], shape[1]):
+        for i in _outwards(start[0], shape[0]):
+            yield i, j
+
+
+def _outwards(start: int, count: int) -> Iterator[int]:
+    yield from range(start, count)
+    yield from range(start - 1, -1, -1)

@@ -1,0 +1,145 @@
+"""The command `diagram`: a map of stationary states over two keys."""
+
+import json
+from pathlib import Path
+from time import monotonic
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from shapespace.base.errors import WorkerError
+from shapespace.cli.progress import ProgressDisplay
+from shapespace.cli.shared import (
+    GAVE_UP,
+    INTERRUPTED,
+    AsJson,
+    NameOrFile,
+    Settings,
+    again,
+    app,
+    examples,
+    find_scenario,
+    print_lines,
+    read_settings,
+    tell,
+)
+
+if TYPE_CHECKING:
+    from shapespace.study.diagram_store import Diagram
+    from shapespace.study.tiles import Done
+
+AXIS = "KEY=FROM:TO:COUNT"
+
+
+@app.command(
+    name="diagram",
+    help_epilogue=examples(
+        "shapespace diagram polar-swimmer -x peclet=25:300:40 -y inverse_hydrodynamic_length=0.1:10:40",
+        "shapespace diagram guided-division -x ring_amplitude=0:4:20 -y peclet=200:450:20 --stability --workers 1",
+        "shapespace diagram polar-swimmer -x peclet=25:300:40 -y turnover_rate=5:15:40 --state trivial,default",
+        "shapespace plot results/polar-swimmer-diagram --observable velocity",
+    ),
+)
+def diagram_command(
+    scenario: NameOrFile,
+    /,
+    *,
+    x: Annotated[str, Parameter(name=["-x", "--x"], metavar=AXIS, help="The key that varies to the right.")],
+    y: Annotated[str, Parameter(name=["-y", "--y"], metavar=AXIS, help="The key that varies upwards.")],
+    settings: Settings = (),
+    state: Annotated[
+        str, Parameter(metavar="NAMES", help="States to map, as of `steady`, with commas between them.")
+    ] = "default",
+    stability: Annotated[bool, Parameter(help="Store the number of growing modes of each state too.")] = False,
+    workers: Annotated[
+        int | None, Parameter(metavar="N", help="Processes on this machine; the default is one for each core.")
+    ] = None,
+    out: Annotated[
+        Path | None, Parameter(metavar="DIR", help="New directory; the default is results/NAME-diagram.")
+    ] = None,
+    resume: Annotated[
+        bool, Parameter(help="Continue the diagram in DIR, or start it where there is none yet.")
+    ] = False,
+    as_json: AsJson = False,
+) -> int:
+    """Map the stationary states over two keys into a Zarr store."""
+    from shapespace.study.diagrams import diagram
+    from shapespace.study.run import free_path
+
+    chosen = find_scenario(scenario).with_overrides(read_settings(settings))
+    name = f"{chosen.name}-diagram"
+    path = out or (Path("results") / name if resume else free_path(name))
+    began = monotonic()
+    try:
+        with ProgressDisplay() as display:
+            rate = _Rate(display, path)
+            found = diagram(
+                chosen, x, y, out=path, states=state.split(","), stability=stability, workers=workers, resume=resume,
+                ready=rate.begin, progress=rate.update,
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        tell(f"interrupted; to continue: {again(path)}")
+        return INTERRUPTED
+    except WorkerError as error:
+        tell(f"{error} To continue: {again(path)}")
+        return GAVE_UP
+    seconds = monotonic() - began
+    if as_json:
+        print(json.dumps(_record(found, rate.computed, seconds), allow_nan=False))
+    else:
+        _summarise(found, rate.computed, seconds)
+    if not found.converged:
+        tell("no point of the grid has a state of this name; choose other values, or another --state.")
+        return GAVE_UP
+    return 0
+
+
+class _Rate:
+    """How many points a second, and how long the rest takes."""
+
+    def __init__(self, display: ProgressDisplay, path: Path) -> None:
+        self._display, self._path = display, path
+        self._done, self._total, self._began = 0, 0, monotonic()
+        self.computed = 0
+
+    def begin(self, done: int, total: int) -> None:
+        """Take note of what is there already."""
+        self._done, self._total = done, total
+        start = f"continuing {self._path} after {done} of {total} points" if done else f"starting {self._path}"
+        self._display.start(start)
+
+    def update(self, tile: "Done") -> None:
+        """Take note of a tile."""
+        self.computed += tile.points
+        done = self._done + self.computed
+        rate = self.computed / max(monotonic() - self._began, 1e-9)
+        text = f"{done} of {self._total} points, {rate:.1f} a second, {(self._total - done) / rate:.0f} s left"
+        self._display.update(text, done / self._total)
+
+
+def _record(found: "Diagram", computed: int, seconds: float) -> dict[str, Any]:
+    """What --json prints."""
+    return {
+        "store": str(found.store),
+        "scenario": found.scenario.name,
+        "parameters": found.scenario.values(),
+        "keys": [*found.request.grid.keys],
+        "states": [*found.request.states],
+        "points": found.points,
+        "computed": computed,
+        "converged": found.converged,
+        "seconds": seconds,
+        "points_per_second": computed / seconds,
+        "failed": found.failed,
+    }
+
+
+def _summarise(found: "Diagram", computed: int, seconds: float) -> None:
+    from collections import Counter
+
+    ends = ", ".join(f"{count} {name}" for name, count in Counter(one["outcome"] for one in found.failed).most_common())
+    print_lines(
+        f"{found.points} points: {found.converged} converged{', ' if ends else ''}{ends}",
+        f"computed {computed} in {seconds:.1f} s, {computed / seconds:.1f} a second",
+        f"stored in {found.store}",
+    )

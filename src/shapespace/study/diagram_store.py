@@ -1,0 +1,295 @@
+"""Diagrams as results: a directory that is one Zarr store, a chunk per tile, with the states that tiles start from.
+
+    zarr.json, NAME/...   the Zarr store: what `xarray.open_zarr` reads
+    anchors/NNNNNN.npz    of each asked state, what it is in the middle of every tile; see `records` for these and the rest
+
+The chunks of a tile are written by whoever computes it, each in one step, that of `outcome` last: it marks the tile done.
+"""
+
+import json
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+import xarray as xr
+import zarr
+from numpy.typing import NDArray
+
+from shapespace.base.errors import StoreError
+from shapespace.base.outcome import Outcome
+from shapespace.base.scales import QUANTITIES
+from shapespace.study.files import storage
+from shapespace.study.frame import Array, read_arrays, write_arrays
+from shapespace.study.grid import Axis, Grid
+from shapespace.study.records import AbstractRecordStore
+from shapespace.study.scenario import Scenario
+
+OUTCOME, UNSTABLE = "outcome", "n_unstable"
+_OUTCOMES = (
+    Outcome.CONVERGED,
+    Outcome.NO_STATE,
+    Outcome.NOT_REACHED,
+    Outcome.DIVERGED,
+    Outcome.MAX_ITERATIONS,
+    Outcome.SINGULAR,
+    Outcome.NOT_FINITE,
+    Outcome.NECK_CLOSED,
+    Outcome.SELF_INTERSECTING,
+    Outcome.BRANCH_STALLED,
+)
+CODES = {outcome: code for code, outcome in enumerate(_OUTCOMES, start=1)}
+"""Numbers of outcomes in stores, which stay; 0 is a point that is not computed yet. Names are stored beside them."""
+NOT_COMPUTED = 0
+ABOUT_SOLUTION = {
+    "correction": "size of the last Newton correction, relative to the state",
+    "iterations": "Newton iterations",
+    "elements": "collocation elements",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Anchors:
+    """What a state is in the middle of the tiles, tile after tile.
+
+    outcomes (m,): how it was found; meshes, xs: of those that were, else empty. All dimensionless.
+    """
+
+    state: str
+    outcomes: tuple[Outcome, ...]
+    meshes: tuple[Array, ...]
+    xs: tuple[Array, ...]
+
+
+@dataclass(frozen=True)
+class DiagramRequest:
+    """What is asked for besides the scenario."""
+
+    grid: Grid
+    states: tuple[str, ...]
+    stability: bool
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        axes = {name: asdict(axis) for name, axis in (("x", self.grid.x), ("y", self.grid.y))}
+        return {**axes, "states": [*self.states], "stability": self.stability}
+
+    @classmethod
+    def from_dict(cls, stored: Mapping[str, Any]) -> Self:
+        """What `as_dict` described."""
+        grid = Grid(Axis(**stored["x"]), Axis(**stored["y"]))
+        return cls(grid, tuple(stored["states"]), stored["stability"])
+
+
+class DiagramStore(AbstractRecordStore[Anchors]):
+    """One diagram. `create` and `resume` give a store to write, `open` one to read, also while it is being written."""
+
+    noun = "diagram"
+    folder = "anchors"
+    note = "anchors are dimensionless, in units of the scales; observables are in the scenario's units"
+
+    @staticmethod
+    def encode(record: Anchors) -> bytes:
+        """All anchors of one state in a few arrays."""
+        words = json.dumps({"state": record.state, "outcomes": record.outcomes})
+        empty = np.zeros(0)
+        return write_arrays(
+            {
+                "mesh_sizes": np.array([len(one) for one in record.meshes]),
+                "sizes": np.array([len(one) for one in record.xs]),
+                "meshes": np.concatenate([empty, *record.meshes]),
+                "xs": np.concatenate([empty, *record.xs]),
+                "about": np.frombuffer(words.encode(), dtype=np.uint8),
+            }
+        )
+
+    @staticmethod
+    def decode(data: bytes) -> Anchors:
+        """The anchors in the bytes of a file."""
+        stored = read_arrays(data)
+        about = json.loads(stored["about"].tobytes())
+        meshes, xs = (
+            tuple(np.split(stored[name], np.cumsum(stored[sizes])[:-1]))
+            for name, sizes in (("meshes", "mesh_sizes"), ("xs", "sizes"))
+        )
+        return Anchors(about["state"], tuple(Outcome(one) for one in about["outcomes"]), meshes, xs)
+
+    @classmethod
+    def create(cls, path: str | Path, scenario: Scenario, request: DiagramRequest, observables: Sequence[str]) -> Self:
+        """A new store, with no point computed, in a directory that is empty or does not exist; StoreError otherwise."""
+        store = cls._create(path, scenario, {cls.noun: request.as_dict()})
+        store.prepare(observables)
+        return store
+
+    @classmethod
+    def resume(cls, path: str | Path, scenario: Scenario, request: DiagramRequest, observables: Sequence[str]) -> Self:
+        """A stored diagram to continue; scenario and request must be the same."""
+        path = Path(path)
+        manifest = cls._read_manifest(path)
+        stored, wanted = manifest.get(cls.noun), request.as_dict()
+        difference = cls._scenario_of(path, manifest).difference(scenario)
+        for name, value in wanted.items():
+            kept = stored.get(name) if isinstance(stored, dict) else None
+            if kept != value:
+                difference = difference or f"{name} is {_short(kept)}, not {_short(value)}"
+        if difference:
+            raise StoreError(
+                f"{path}: holds a diagram whose {difference}; resume with the same value or choose another --out."
+            )
+        store = cls._reopen(path, scenario)
+        store.prepare(observables)
+        return store
+
+    def _disorder(self, previous: Anchors, record: Anchors) -> str | None:
+        return None
+
+    @property
+    def request(self) -> DiagramRequest:
+        """What was asked for."""
+        return DiagramRequest.from_dict(self.manifest[self.noun])
+
+    def prepare(self, observables: Sequence[str]) -> None:
+        """Make the arrays of the Zarr store, all fill, unless they are there: its description comes last."""
+        with storage(self.path):
+            if (self.path / "zarr.json").exists():
+                return
+            root = zarr.open_group(self.path, mode="a", zarr_format=3)
+            grid, states = self.request.grid, self.request.states
+            names = [*observables, *ABOUT_SOLUTION]
+            for axis in (grid.x, grid.y):
+                coordinate = self._array(root, axis.key, (axis.key,), np.nan, "f8", (axis.count,), (axis.count,))
+                coordinate[:] = axis.values
+            dims: tuple[str, ...]
+            shape: tuple[int, ...]
+            chunks: tuple[int, ...]
+            dims, shape, chunks = grid.keys[::-1], grid.shape[::-1], (grid.y.edge, grid.x.edge)
+            if len(states) > 1:
+                dims, shape, chunks = ("state", *dims), (len(states), *shape), (len(states), *chunks)
+                label = root.create_array(
+                    "state", shape=(len(states),), dtype="str", dimension_names=("state",), overwrite=True
+                )
+                label[:] = np.array(states)
+            for name in names:
+                self._array(root, name, dims, np.nan, "f8", shape, chunks)
+            if self.request.stability:
+                self._array(root, UNSTABLE, dims, np.nan, "f8", shape, chunks)
+            self._array(root, OUTCOME, dims, NOT_COMPUTED, "i1", shape, chunks)
+            root.attrs.update(self._attributes())
+            with warnings.catch_warnings():
+                # One read instead of one for each array; readers of the plain format pass over it.
+                warnings.simplefilter("ignore", zarr.errors.ZarrUserWarning)
+                zarr.consolidate_metadata(self.path)
+
+    def _array(
+        self, root: Any, name: str, dims: tuple[str, ...], fill: float, dtype: str, shape: Any, chunks: Any
+    ) -> Any:
+        return root.create_array(
+            name,
+            shape=shape,
+            chunks=chunks,
+            dtype=dtype,
+            fill_value=fill,
+            dimension_names=dims,
+            attributes=self._about(name),
+            overwrite=True,
+        )
+
+    def _about(self, name: str) -> dict[str, Any]:
+        """Attributes of a variable."""
+        if name == OUTCOME:
+            meanings = ["not-computed", *CODES]
+            return {"flag_values": [*range(len(meanings))], "flag_meanings": " ".join(meanings)}
+        if name == UNSTABLE:
+            return {"long_name": "number of growing modes"}
+        if name in ABOUT_SOLUTION:
+            return {"long_name": ABOUT_SOLUTION[name]}
+        quantity = QUANTITIES[name]
+        return {"long_name": quantity.meaning, "symbol": quantity.symbol, "units": self.scenario.scales.unit(name)}
+
+    def _attributes(self) -> dict[str, Any]:
+        manifest = self.manifest
+        return {
+            "title": f"{self.scenario.name}: stationary states over {' and '.join(self.request.grid.keys)}",
+            "source": f"shapespace {self.versions['shapespace']}",
+            "parameters": self.scenario.values(),
+            **{name: manifest[name] for name in ("created", "versions", "scenario", "diagram")},
+        }
+
+    def write_tile(self, tile: tuple[int, int], values: Mapping[str, NDArray[Any]]) -> None:
+        """The points of a tile, (states, n_x, n_y) by name; what is not given stays empty."""
+        with storage(self.path, "nothing finished is lost: then resume the diagram"):
+            # Without the lock: tiles are written by those who compute them, each its own chunks.
+            root: Any = zarr.open_group(self.path, mode="r+")
+            x, y = self.request.grid.span(tile)
+            where = (..., y, x)
+            for name in [*(set(values) - {OUTCOME}), OUTCOME]:
+                rows = values[name].swapaxes(1, 2)
+                root[name][where] = rows if len(self.request.states) > 1 else rows[0]
+
+    @property
+    def outcomes(self) -> NDArray[np.int8]:
+        """Codes (states, n_x, n_y) of all points."""
+        root: Any = zarr.open_group(self.path, mode="r")
+        codes = np.asarray(root[OUTCOME][...])
+        return codes.reshape(-1, *codes.shape[-2:]).swapaxes(1, 2)
+
+    @property
+    def missing_tiles(self) -> list[tuple[int, int]]:
+        """Tiles that are not done, in order."""
+        grid, codes = self.request.grid, self.outcomes
+        return [tile for tile in grid.tiles if (codes[(0, *grid.span(tile))] == NOT_COMPUTED).any()]
+
+
+def _short(value: Any) -> str:
+    return str(Axis(**value)) if isinstance(value, dict) else str(value)
+
+
+@dataclass(frozen=True, eq=False)
+class Diagram:
+    """A map of stationary states, as far as it is computed. store: its directory, which is a Zarr store."""
+
+    scenario: Scenario
+    request: DiagramRequest
+    store: Path
+
+    @cached_property
+    def dataset(self) -> xr.Dataset:
+        """Dimensions named as the two keys (and `state` where several are asked), a variable for each observable."""
+        return xr.open_zarr(self.store).load()
+
+    @property
+    def points(self) -> int:
+        """Points of the grid, times states."""
+        return int(self.dataset[OUTCOME].size)
+
+    @property
+    def converged(self) -> int:
+        """Points with a state."""
+        return int((self.dataset[OUTCOME] == CODES[Outcome.CONVERGED]).sum())
+
+    @property
+    def failed(self) -> list[dict[str, Any]]:
+        """Computed points without a state: keys, state, outcome and reason."""
+        (x, y), data = self.request.grid.keys, self.dataset
+        codes = data[OUTCOME].transpose(..., y, x).to_numpy().reshape(-1, *self.request.grid.shape[::-1])
+        names = {code: outcome for outcome, code in CODES.items()}
+        is_failed = (codes != NOT_COMPUTED) & (codes != CODES[Outcome.CONVERGED])
+        return [
+            {
+                x: float(data[x][i]),
+                y: float(data[y][j]),
+                "state": self.request.states[s],
+                "outcome": names[int(codes[s, j, i])].value,
+                "reason": names[int(codes[s, j, i])].advice,
+            }
+            for s, j, i in np.argwhere(is_failed)
+        ]
+
+
+def open_diagram(path: str | Path) -> Diagram:
+    """A stored diagram, finished or not. StoreError where there is none."""
+    store = DiagramStore.open(path)
+    return Diagram(store.scenario, store.request, store.path)

@@ -1,0 +1,149 @@
+"""Maps of stationary states over two keys: a coarse skeleton first, then tile by tile, each from the skeleton alone."""
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from shapespace.analysis.stationary import Stationary
+from shapespace.analysis.sweeping import Index, Sweep
+from shapespace.base.arrays import Array
+from shapespace.base.errors import InputError
+from shapespace.base.outcome import Outcome
+from shapespace.study.diagram_store import CODES, Anchors, Diagram, DiagramRequest, DiagramStore, open_diagram
+from shapespace.study.grid import Axis, Grid
+from shapespace.study.keyed import KeyedProblem
+from shapespace.study.paths import StateName, read_state_name
+from shapespace.study.records import holds_store
+from shapespace.study.scenario import Scenario
+from shapespace.study.steady import check_has_isolated_states, key_values, solve_steady
+from shapespace.study.tiles import Done, Surveyor, compute_tile, observable_names
+from shapespace.study.workers import Workers, available_cores
+
+MAX_NAMED = 4
+"""Points where the named state is looked for from the scenario's own reference: each costs seconds."""
+
+Progress = Callable[[Done], None]
+"""Called after each tile."""
+
+
+def diagram(
+    scenario: Scenario,
+    x: Axis | str,
+    y: Axis | str,
+    *,
+    out: str | Path,
+    states: Sequence[str] = ("default",),
+    stability: bool = False,
+    workers: int | None = None,
+    resume: bool = False,
+    progress: Progress | None = None,
+    ready: Callable[[int, int], None] | None = None,
+) -> Diagram:
+    """Stationary states of a scenario over a grid of two keys, x and y as `key=from:to:count`, in a Zarr store.
+
+    states: names of states, as of `steady`; each is followed from where it is found first. stability: store the number of
+    growing modes too. workers: processes, by default one for each core; the map does not depend on them. `out` is the
+    directory of the store, new or empty; with `resume` a store there is continued. ready: told how many points are done of
+    how many. InputError before anything is computed; where a process cannot be kept alive, WorkerError.
+    """
+    grid = Grid(*(Axis.read(one, flag) if isinstance(one, str) else one for flag, one in (("-x", x), ("-y", y))))
+    request = make_request(scenario, grid, states, stability)
+    count = available_cores() if workers is None else workers
+    if count < 1:
+        raise InputError(f"--workers {count}: must be at least 1; give a larger number.")
+    begin = DiagramStore.resume if resume and holds_store(out) else DiagramStore.create
+    with begin(out, scenario, request, observable_names(scenario, grid.keys)) as store:
+        missing = store.missing_tiles
+        sizes = {tile: len(states) * _size(grid, tile) for tile in grid.tiles}
+        if ready is not None:
+            ready(sum(sizes.values()) - sum(sizes[tile] for tile in missing), sum(sizes.values()))
+        for name in request.states[len(store) :]:
+            store.append(make_anchors(scenario, grid, StateName(name)))
+        for done in _computed(store, missing, min(count, len(missing))):
+            if progress is not None:
+                progress(done)
+        if missing or store.outcome is None:
+            store.finish(Outcome.COMPLETE)
+    return open_diagram(out)
+
+
+def make_request(scenario: Scenario, grid: Grid, states: Sequence[str], stability: bool) -> DiagramRequest:
+    """What is asked for, checked: InputError where it cannot be had."""
+    names = tuple(str(read_state_name(name, scenario.model)) for name in states)
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"--state {','.join(states)}: must name different states; give each once.")
+    for corner in grid.corners(scenario):
+        check_has_isolated_states(corner)
+    KeyedProblem.of(scenario, grid.keys)
+    return DiagramRequest(grid, names, stability)
+
+
+def _size(grid: Grid, tile: Index) -> int:
+    return int(np.prod([one.stop - one.start for one in grid.span(tile)]))
+
+
+def _computed(store: DiagramStore, tiles: Sequence[Index], count: int) -> Iterator[Done]:
+    """Finished tiles, in this process or by workers."""
+    if count <= 1:
+        yield from (compute_tile(store.path, tile) for tile in tiles)
+        return
+    with Workers(count) as workers:
+        yield from workers.map(store.path, tiles)
+
+
+def make_anchors(scenario: Scenario, grid: Grid, name: StateName) -> Anchors:
+    """The named state in the middle of each tile.
+
+    It is found by its name where the grid is nearest to the scenario's own values, followed from there from tile to tile, and
+    looked for by name again where that does not lead.
+    """
+    surveyor = Surveyor(scenario, grid.keys, stability=False)
+    values = grid.values(grid.x.anchors, grid.y.anchors)
+    sweep = Sweep(values)
+    own = key_values(scenario, grid.keys)
+    spans = np.ptp(values, axis=(0, 1))
+    spans[spans == 0.0] = 1.0
+    known = (own - values[0, 0]) / spans
+    places = {at: (values[at] - values[0, 0]) / spans for at in np.ndindex(*values.shape[:2])}
+    failure = Outcome.NO_STATE
+    tried: list[Array] = []
+    for _ in range(MAX_NAMED):
+        missing = sweep.missing
+        if not missing:
+            break
+        seen = [*tried, *(places[at] for at in sweep.found)]
+        at = max(missing, key=lambda one: _remoteness(places[one], seen, known))
+        tried.append(places[at])
+        keys = dict(zip(grid.keys, values[at].tolist(), strict=True))
+        steady = solve_steady(scenario.with_overrides(keys), name)
+        if not steady.outcome.is_success:
+            failure = steady.outcome if steady.outcome in CODES else Outcome.NO_STATE
+            continue
+        start = surveyor.state(steady.problem.base.mesh, steady.found.x, sweep.p(at))
+        sweep.begin(at, start)
+        sweep.spread(at)
+    return _anchors(name, grid, sweep, failure)
+
+
+def _remoteness(place: Array, seen: Sequence[Array], known: Array) -> float:
+    """How far a place is from all those seen; before there is one, how near it is to the known place."""
+    if not seen:
+        return -float(np.linalg.norm(place - known))
+    return min(float(np.linalg.norm(place - one)) for one in seen)
+
+
+def _anchors(name: StateName, grid: Grid, sweep: Sweep, failure: Outcome) -> Anchors:
+    found: list[Stationary | None] = [sweep.found.get(tile) for tile in grid.tiles]
+    outcomes = tuple(
+        Outcome.CONVERGED if one is not None else sweep.reasons.get(tile, failure)
+        for tile, one in zip(grid.tiles, found, strict=True)
+    )
+    empty = np.zeros(0)
+    meshes = tuple(_mesh(one) if one is not None else empty for one in found)
+    return Anchors(str(name), outcomes, meshes, tuple(one.x if one is not None else empty for one in found))
+
+
+def _mesh(state: Stationary) -> Array:
+    assert isinstance(state.problem, KeyedProblem)
+    return state.problem.base.mesh

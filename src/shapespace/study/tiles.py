@@ -1,0 +1,144 @@
+"""The points of one tile of a diagram, from the states in the middle of the tiles around: what a worker computes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from shapespace.analysis.stability import Spectrum
+from shapespace.analysis.stationary import Stationary
+from shapespace.analysis.sweeping import Sweep
+from shapespace.base.arrays import Array
+from shapespace.base.outcome import Outcome
+from shapespace.base.problem import Rate
+from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, OUTCOME, UNSTABLE, Anchors, DiagramStore
+from shapespace.study.engine import Engine
+from shapespace.study.keyed import KeyedProblem
+from shapespace.study.observables import measure, shape_end
+from shapespace.study.scenario import Scenario
+from shapespace.study.spectra import spectrum_at
+
+Tile = tuple[int, int]
+
+
+class Done(NamedTuple):
+    """A finished tile: its points, those of them with a state, and the seconds it took."""
+
+    tile: Tile
+    points: int
+    converged: int
+    seconds: float
+
+
+def compute_tile(path: str | Path, tile: Tile) -> Done:
+    """Compute a tile of a stored diagram and write it there. What it holds depends on the store's anchors alone."""
+    start = perf_counter()
+    store = DiagramStore.open(path)
+    surveys = [_survey(store, anchors, tile) for anchors in store]
+    values = {name: np.stack([one[name] for one in surveys]) for name in surveys[0]}
+    store.write_tile(tile, values)
+    outcomes = values[OUTCOME]
+    return Done(tile, outcomes.size, int((outcomes == CODES[Outcome.CONVERGED]).sum()), perf_counter() - start)
+
+
+def _survey(store: DiagramStore, anchors: Anchors, tile: Tile) -> dict[str, Array]:
+    """Arrays (n_x, n_y) of a tile's points, in one of the states."""
+    grid = store.request.grid
+    surveyor = Surveyor(store.scenario, grid.keys, store.request.stability)
+    sweep = Sweep(grid.values(*grid.span(tile)))
+    tiles = {one: number for number, one in enumerate(grid.tiles)}
+    for near in _around(tile):
+        if near not in tiles or not sweep.missing:
+            continue
+        number = tiles[near]
+        if anchors.outcomes[number] is not Outcome.CONVERGED:
+            continue
+        i, j = grid.x.anchors[near[0]], grid.y.anchors[near[1]]
+        x, y = grid.span(tile)
+        place = np.array([i - x.start, j - y.start])
+        at = min(sweep.missing, key=lambda one: (np.abs(np.array(one) - place).sum(), one))
+        state = surveyor.state(anchors.meshes[number], anchors.xs[number], grid.values(i, j).reshape(2))
+        if sweep.begin(at, state):
+            sweep.spread(at)
+    return surveyor.survey(sweep, anchors.outcomes[tiles[tile]])
+
+
+def _around(tile: Tile) -> Iterator[Tile]:
+    """A tile and its neighbours, the nearest first."""
+    yield tile
+    for i, j in ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, -1), (-1, 1), (1, 1)):
+        yield tile[0] + i, tile[1] + j
+
+
+@dataclass
+class Surveyor:
+    """Turns states of a scenario, two of whose keys vary, into what a diagram stores."""
+
+    scenario: Scenario
+    keys: tuple[str, str]
+    stability: bool
+
+    def __post_init__(self) -> None:
+        self._engine = Engine.of(self.scenario)
+        self._problem = KeyedProblem.of(self.scenario, self.keys)
+        self.names = observable_names(self.scenario, self.keys)
+        self._units = self._unit(self.scenario)
+        at = {key: 0.5 * float(self.scenario.values()[key]) or 0.5 for key in self.keys}
+        self._is_scaled = self._unit(self.scenario.with_overrides(at)) != self._units
+
+    def state(self, mesh: Array, x: Array, q: Array) -> Stationary:
+        """A stored state at values q (2,) of the keys."""
+        problem = replace(self._problem, base=self._problem.base.on_mesh(mesh))
+        return Stationary(problem, x, q, Outcome.CONVERGED, 0.0, np.nan, 0, True)
+
+    def survey(self, sweep: Sweep, fallback: Outcome) -> dict[str, Array]:
+        """Arrays (n_x, n_y) by name. fallback: why there is no state where none was even tried."""
+        shape = sweep.values.shape[:2]
+        names = [*self.names, *ABOUT_SOLUTION, *([UNSTABLE] if self.stability else [])]
+        out: dict[str, Array] = {name: np.full(shape, np.nan) for name in names}
+        untried = fallback if fallback is not Outcome.CONVERGED else Outcome.NOT_REACHED
+        near: Spectrum | None = None
+        out[OUTCOME] = np.zeros(shape, np.int8)
+        for at in np.ndindex(*shape):
+            state = sweep.found.get(at)
+            if state is None:
+                out[OUTCOME][at] = CODES[sweep.reasons.get(at, untried)]
+                continue
+            values, end = self.observed(state)
+            out[OUTCOME][at] = CODES[end or Outcome.CONVERGED]
+            values |= {"correction": state.correction, "iterations": state.iterations}
+            if self.stability:
+                assert isinstance(state.problem, KeyedProblem)
+                near = spectrum_at(state.problem, state.x, state.p, near=near)
+                values[UNSTABLE] = np.nan if near.n_unstable is None else near.n_unstable
+            for name, value in values.items():
+                out[name][at] = value
+        return out
+
+    def observed(self, state: Stationary) -> tuple[dict[str, float], Outcome | None]:
+        """Observables in the scenario's units, and why the state is no physical shape, if so."""
+        assert isinstance(state.problem, KeyedProblem)
+        problem = state.problem.base
+        p = state.problem.powers.value(state.p)
+        values = self._engine.values | dict(zip(self._engine.system.parameters, p.tolist(), strict=True))
+        engine = replace(self._engine, problem=problem, p=p, values=values)
+        measured = measure(engine, state.x, Rate.of_growth(problem.stored(state.x, p)))
+        units = self._units
+        if self._is_scaled:
+            units = self._unit(self.scenario.with_overrides(dict(zip(self.keys, state.p.tolist(), strict=True))))
+        out = {name: measured[name] * units[name] for name in self.names if name in measured}
+        return out | {"elements": problem.elements}, shape_end(problem, state.x)
+
+    def _unit(self, scenario: Scenario) -> dict[str, float]:
+        return {name: scenario.scales.factor(name) for name in self.names}
+
+
+def observable_names(scenario: Scenario, keys: tuple[str, str]) -> list[str]:
+    """What the scenario's states report; a key that is an observable as well stands for itself."""
+    engine = Engine.of(scenario)
+    x = engine.problem.pack(engine.initial_state())
+    values = measure(engine, x, Rate.of_growth(engine.problem.stored(x, engine.p)))
+    return [name for name in dict.fromkeys((*values, "neck_radius")) if name not in keys]

@@ -1,0 +1,91 @@
+"""The figure of a diagram: an observable, or the number of growing modes, as colours over the plane of the two keys."""
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import BoundaryNorm, CenteredNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from shapespace.base.errors import InputError
+from shapespace.base.outcome import Outcome
+from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, NOT_COMPUTED, OUTCOME, UNSTABLE, Diagram
+from shapespace.view import style
+from shapespace.view.branch import LEAST_CHANGE, TELLING, quantity_label
+
+HEIGHT_MM = 90.0
+HATCH = "////"
+MOST_COUNTED = 8
+"""Numbers of growing modes beyond this share a colour."""
+
+
+def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
+    """One map for each state, side by side in one scale; hatched where there is none, white where nothing is computed yet.
+
+    The observable is the most telling one that applies where none is given.
+    """
+    data, (x, y) = diagram.dataset, diagram.request.grid.keys
+    names = [str(name) for name in data.data_vars if name not in (OUTCOME, *ABOUT_SOLUTION)]
+    is_state = data[OUTCOME] == CODES[Outcome.CONVERGED]
+    name = observable or _telling(diagram, data.where(is_state))
+    if name not in names:
+        raise InputError(f"{name}: is no observable of this diagram; choose one of {', '.join(names)}.")
+    values = data[name].where(is_state).transpose(..., y, x)
+    maps = [values] if "state" not in values.dims else [values.sel(state=one) for one in diagram.request.states]
+    outcomes = data[OUTCOME].transpose(..., y, x).to_numpy().reshape(len(maps), *values.shape[-2:])
+    norm, colours = _scale(name, values.to_numpy())
+    with style.house_style():
+        width = min(0.4 + 0.4 * len(maps), 1.2) * style.WIDTH_MM
+        figure = Figure(figsize=(width * style.MM, HEIGHT_MM * style.MM), layout="constrained")
+        FigureCanvasAgg(figure)
+        panels = figure.subplots(1, len(maps), squeeze=False, sharey=True)[0]
+        for axes, one, codes, state in zip(panels, maps, outcomes, diagram.request.states, strict=True):
+            image = axes.pcolormesh(data[x], data[y], one, norm=norm, cmap=colours, rasterized=True)
+            _mark_missing(axes, data[x].to_numpy(), data[y].to_numpy(), codes)
+            axes.set_xlabel(quantity_label(diagram.scenario, x))
+            if len(maps) > 1:
+                axes.set_title(state)
+        panels[0].set_ylabel(quantity_label(diagram.scenario, y))
+        label = "growing modes" if name == UNSTABLE else quantity_label(diagram.scenario, name)
+        bar = figure.colorbar(image, ax=panels, label=label)
+        if isinstance(norm, BoundaryNorm):
+            bar.set_ticks([0.5 * (a + b) for a, b in zip(norm.boundaries, norm.boundaries[1:], strict=False)])
+            bar.set_ticklabels([str(count) for count in range(len(norm.boundaries) - 1)])
+        bar.outline.set_visible(False)
+    return figure
+
+
+def _telling(diagram: Diagram, states: xr.Dataset) -> str:
+    """The first of TELLING that changes over the map."""
+    names = TELLING[diagram.scenario.model]
+    for name in names:
+        if float(states[name].max() - states[name].min()) > LEAST_CHANGE:
+            return name
+    return names[-1]
+
+
+def _scale(name: str, values: np.ndarray) -> tuple[Normalize, object]:
+    """Counts in steps, signed values from the middle outwards, others from pale to dark; all told apart without hue."""
+    known = values[np.isfinite(values)]
+    least, most = (float(known.min()), float(known.max())) if known.size else (0.0, 1.0)
+    if name == UNSTABLE:
+        colours = style.regulator_map()
+        return BoundaryNorm(np.arange(min(most, MOST_COUNTED) + 2) - 0.5, colours.N), colours
+    if least < 0.0 < most and min(-least, most) > 0.01 * max(-least, most):
+        return CenteredNorm(), style.signed_map()
+    dark_end = style.regulator_map()
+    return Normalize(least, most), dark_end if abs(most) >= abs(least) else dark_end.reversed()
+
+
+def _mark_missing(axes: Axes, x: np.ndarray, y: np.ndarray, codes: np.ndarray) -> None:
+    failed = (codes != NOT_COMPUTED) & (codes != CODES[Outcome.CONVERGED])
+    if not failed.any():
+        return
+    axes.pcolor(x, y, np.ma.masked_where(~failed, codes), hatch=HATCH, facecolor="none", edgecolor=style.FAINT, lw=0.0)
+    axes.legend(
+        handles=[Patch(facecolor="white", edgecolor=style.FAINT, hatch=HATCH, lw=0.0, label="no state")],
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.2,
+    )

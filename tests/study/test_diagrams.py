@@ -1,0 +1,233 @@
+"""Diagrams: states over two keys against single solves and exact onsets; stores, resuming, workers and their deaths."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from shapespace.base.errors import InputError, StoreError
+from shapespace.base.outcome import Outcome
+from shapespace.study.diagram_store import CODES, Diagram, DiagramStore, open_diagram
+from shapespace.study.diagrams import diagram
+from shapespace.study.grid import Axis, Grid
+from shapespace.study.scenario import Scenario, scenario
+from shapespace.study.steady import steady
+from shapespace.study.tiles import Done, compute_tile
+from shapespace.study.workers import Workers
+
+X, Y = "peclet=18:40:12", "inverse_hydrodynamic_length=0.5:5:10"
+ONSET = 22.0
+"""(2 + k R0^2/D)/(c0 f'(c0)) of the polar swimmer."""
+
+
+def swimmer() -> Scenario:
+    return scenario("polar-swimmer", elements=20, mesh_tolerance=1e-3)
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Diagram:
+    """Spheres and swimmers around the onset."""
+    out = tmp_path_factory.mktemp("diagrams") / "swimmer"
+    return diagram(swimmer(), X, Y, states=("trivial", "default"), out=out, workers=1)
+
+
+def test_states_exist_where_they_should(stored: Diagram):
+    """The sphere everywhere, the swimmer above its pitchfork, and there with the polarity of one side."""
+    data = stored.dataset
+    assert data["outcome"].dims == ("state", "inverse_hydrodynamic_length", "peclet")
+    exists = data["outcome"] == CODES[Outcome.CONVERGED]
+    assert exists.sel(state="trivial").all()
+    assert (exists.sel(state="default") == (data["peclet"] > ONSET)).all()
+    assert abs(data["velocity"].sel(state="trivial")).max() < 1e-9
+    speed = data["velocity"].sel(state="default").where(data["peclet"] > ONSET, drop=True)
+    assert (speed < -0.5).all() or (speed > 0.5).all()
+    assert (abs(speed).diff("peclet") > 0.0).all()
+    assert (data["correction"].fillna(0.0) < 1e-8).all()
+    assert stored.points == 240
+    assert stored.converged == 120 + 10 * int((data["peclet"] > ONSET).sum())
+    assert len(stored.failed) == stored.points - stored.converged
+    assert {one["outcome"] for one in stored.failed} <= {"no-state", "not-reached"}
+    assert {"peclet", "inverse_hydrodynamic_length", "state", "outcome", "reason"} == stored.failed[0].keys()
+
+
+def test_states_are_those_of_single_solves(stored: Diagram):
+    data = stored.dataset.sel(state="default")
+    for i, j in ((11, 9), (4, 0), (3, 5)):
+        point = data.isel(peclet=i, inverse_hydrodynamic_length=j)
+        keys = {name: float(point[name]) for name in stored.request.grid.keys}
+        single = steady(stored.scenario.with_overrides(keys)).observables
+        for name in ("area", "bending_energy", "pressure", "dissipation", "length"):
+            assert float(point[name]) == pytest.approx(single[name], rel=1e-6), name
+        assert abs(float(point["velocity"])) == pytest.approx(abs(single["velocity"]), rel=1e-6)
+
+
+def test_a_store_describes_itself(stored: Diagram):
+    data = xr.open_zarr(stored.store)
+    assert data["velocity"].attrs == {"long_name": "axial swimming speed", "symbol": "v0", "units": "R0/tau"}
+    assert data.attrs["parameters"]["turnover_rate"] == 9.0
+    assert data.attrs["versions"]["shapespace"]
+    assert data["outcome"].attrs["flag_meanings"].split()[CODES[Outcome.CONVERGED]] == "converged"
+    assert data["peclet"].to_numpy() == pytest.approx(np.linspace(18.0, 40.0, 12))
+    assert open_diagram(stored.store).request == stored.request
+
+
+def test_growing_modes(tmp_path: Path):
+    """The sphere's l = 1 mode grows above the onset, nothing grows of the swimmer."""
+    axes = ("peclet=19:25:4", "inverse_hydrodynamic_length=1:2:2")
+    found = diagram(swimmer(), *axes, states=("trivial", "default"), stability=True, out=tmp_path / "d", workers=1)
+    growing = found.dataset["n_unstable"]
+    assert growing.sel(state="trivial").to_numpy().tolist() == [[0, 0, 1, 1]] * 2
+    assert np.nan_to_num(growing.sel(state="default"), nan=-1).tolist() == [[-1, -1, 0, 0]] * 2
+
+
+def test_a_lost_tile_is_computed_again_the_same(stored: Diagram):
+    told: list[Done] = []
+    before = stored.dataset.copy(deep=True)
+    (lost,) = [one for one in (stored.store / "outcome").rglob("*") if one.match("c/0/1/0")]
+    lost.unlink()
+    assert DiagramStore.open(stored.store).missing_tiles == [(0, 1)]
+    arguments = {"states": ("trivial", "default"), "out": stored.store, "workers": 1, "resume": True}
+    again = diagram(swimmer(), X, Y, progress=told.append, **arguments)  # type: ignore[arg-type]
+    assert [one.tile for one in told] == [(0, 1)]
+    xr.testing.assert_identical(again.dataset, before)
+    diagram(swimmer(), X, Y, progress=told.append, **arguments)  # type: ignore[arg-type]
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"x": "peclet=18:41:12"}, "x is peclet=18:40:12, not peclet=18:41:12"),
+        ({"states": ("default",)}, "states is"),
+        ({"scenario": swimmer().with_overrides({"turnover_rate": 8.0})}, "turnover_rate is 9.0, not 8.0"),
+    ],
+)
+def test_another_diagram_is_not_continued(stored: Diagram, changes: dict[str, object], part: str):
+    before = {path: path.stat().st_mtime_ns for path in stored.store.rglob("*")}
+    arguments = {"scenario": swimmer(), "x": X, "y": Y, "states": ("trivial", "default"), "workers": 1} | changes
+    with pytest.raises(StoreError, match="resume with the same") as complaint:
+        diagram(**arguments, out=stored.store, resume=True)  # type: ignore[arg-type]
+    assert part in str(complaint.value)
+    assert before == {path: path.stat().st_mtime_ns for path in stored.store.rglob("*")}
+
+
+def test_no_state_at_all_says_so(tmp_path: Path):
+    found = diagram(swimmer(), "peclet=5:10:2", "inverse_hydrodynamic_length=1:2:2", out=tmp_path / "d", workers=1)
+    assert found.converged == 0
+    assert [one["outcome"] for one in found.failed] == ["no-state"] * 4
+
+
+def test_tiles_cover_the_grid_once():
+    for counts in ((2, 500), (9, 10), (11, 26), (101, 77)):
+        grid = Grid(*(Axis(key, 0.0, 1.0, count) for key, count in zip(("a", "b"), counts, strict=True)))
+        met = np.zeros(grid.shape, int)
+        for tile in grid.tiles:
+            span = grid.span(tile)
+            met[span] += 1
+            i, j = grid.x.anchors[tile[0]], grid.y.anchors[tile[1]]
+            assert span[0].start <= i < span[0].stop
+            assert span[1].start <= j < span[1].stop
+            assert met[span].size <= 625
+        assert (met == 1).all()
+
+
+def test_workers_give_the_same_map_and_may_be_killed(stored: Diagram, tmp_path: Path):
+    """A killed worker's tile is computed by another; no process is left."""
+    request = stored.request
+    names = [
+        str(name)
+        for name in stored.dataset.data_vars
+        if name not in ("outcome", "correction", "iterations", "elements")
+    ]
+    with DiagramStore.create(tmp_path / "d", stored.scenario, request, names) as store:
+        for anchors in DiagramStore.open(stored.store):
+            store.append(anchors)
+        done: list[Done] = []
+        with Workers(2) as workers:
+            for one in workers.map(store.path, request.grid.tiles):
+                if not done:
+                    os.kill(workers.pids[0], signal.SIGKILL)
+                done.append(one)
+            pids = workers.pids
+    assert sorted(one.tile for one in done) == sorted(request.grid.tiles)
+    assert pids
+    assert not [pid for pid in pids if Path(f"/proc/{pid}").exists()]
+    one, other = open_diagram(tmp_path / "d").dataset, stored.dataset
+    for name in other.data_vars:
+        np.testing.assert_allclose(one[name], other[name], rtol=1e-9, atol=1e-9, err_msg=str(name))
+
+
+@pytest.mark.slow
+def test_a_killed_client_leaves_no_process_and_loses_nothing(stored: Diagram, tmp_path: Path):
+    out = tmp_path / "d"
+    command = [sys.executable, "-m", "shapespace", "diagram", "polar-swimmer", "-s", "elements=20", "mesh_tolerance=1e-3",
+               "-x", X, "-y", Y, "--state", "trivial,default", "--workers", "2", "--out", str(out)]  # fmt: skip
+    client = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    deadline = time.monotonic() + 240.0
+    while not (finished := [path for path in (out / "outcome" / "c").rglob("*") if path.is_file()]):
+        assert client.poll() is None, "it ended by itself"
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    children = [int(pid) for pid in Path(f"/proc/{client.pid}/task/{client.pid}/children").read_text().split()]
+    assert len(children) == 2
+    client.send_signal(signal.SIGKILL)
+    client.wait()
+    while any(Path(f"/proc/{pid}").exists() for pid in children):
+        assert time.monotonic() < deadline, "a worker survives"
+        time.sleep(0.05)
+    missing = DiagramStore.open(out).missing_tiles
+    assert len(missing) <= 4 - len(finished)
+    times = {path: path.stat().st_mtime_ns for path in finished}
+    found = diagram(swimmer(), X, Y, states=("trivial", "default"), out=out, workers=1, resume=True)
+    assert times == {path: path.stat().st_mtime_ns for path in finished}
+    for name in stored.dataset.data_vars:
+        np.testing.assert_allclose(found.dataset[name], stored.dataset[name], rtol=1e-9, atol=1e-9, err_msg=str(name))
+
+
+def test_a_worker_meets_no_store(tmp_path: Path):
+    with pytest.raises(StoreError, match="is not a directory"):
+        compute_tile(tmp_path / "none", (0, 0))
+
+
+@pytest.mark.parametrize(
+    ("x", "part"),
+    [
+        ("peclet", "must be KEY=FROM:TO:COUNT"),
+        ("peclet=1:b:3", "FROM and TO must be numbers"),
+        ("peclet=1:2:2.5", "COUNT must be a whole number"),
+        ("peclet=30:20:5", "must run upwards"),
+        ("peclet=20:20:5", "must run upwards"),
+        ("peclet=20:inf:5", "must run between finite numbers"),
+        ("peclet=20:30:1", "must have 2 to"),
+        ("pecelt=20:30:5", "peclet"),
+        ("elements=20:30:5", "elements"),
+        ("turnover_rate=-1:3:4", "turnover_rate"),
+        ("friction=1:3:4", "varies the same as -x"),
+    ],
+)
+def test_bad_axes_are_refused(tmp_path: Path, x: str, part: str):
+    with pytest.raises(InputError, match=re.escape(part)):
+        diagram(swimmer(), x, Y, out=tmp_path / "d", workers=1)
+    assert not (tmp_path / "d").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "part"),
+    [
+        ({"workers": 0}, "--workers 0"),
+        ({"states": ()}, "must name different states"),
+        ({"states": ("default", "default")}, "must name different states"),
+        ({"states": ("upside-down",)}, "upside-down"),
+    ],
+)
+def test_bad_requests_are_refused(tmp_path: Path, arguments: dict[str, object], part: str):
+    with pytest.raises(InputError, match=re.escape(part)):
+        diagram(swimmer(), X, Y, out=tmp_path / "d", **arguments)  # type: ignore[arg-type]
+    assert not (tmp_path / "d").exists()
