@@ -257,3 +257,12 @@ def test_a_branch_between_two_pitchforks_ends_at_the_second(tmp_path: Path):
     assert end.kind == "pitchfork"
     assert end.parameter == pytest.approx(second.parameter, abs=first.parameter_error + second.parameter_error)
     assert len(side.points) < 100
+
+
+def test_a_branch_in_the_ring_begins_at_the_sphere():
+    """At Pe = 450 and k = 9 there are swimmers without a ring; states with one lead on from the sphere."""
+    case = ss.scenario("guided-division", elements=20, turnover_rate=9.0)
+    found = ss.branch(case, "ring_amplitude", 0.01, start=0.0, stability=False)
+    assert found.began == "trivial"
+    assert found.points[0].observables["area"] == pytest.approx(4.0 * np.pi)
+    assert found["end-1"].observables["velocity"] == pytest.approx(0.0, abs=1e-8)

@@ -220,7 +220,7 @@ def _leg(
 def _start(scenario: Scenario, request: Request, known: Start | None) -> tuple[Point, str] | _End:
     """The first point, its tangent towards the stop or along the chosen side, and the name of the state it is."""
     if known is None:
-        name, found = _named(scenario, request.state)
+        name, found = _named(scenario, request)
     elif (first := _stored_start(scenario, request, known)) is not None:
         return first if isinstance(first, _End) else (first, known.text)
     else:
@@ -252,9 +252,12 @@ def _begun(first: Point | Outcome) -> Point | _End:
     return _End(first, "The start has no single direction to go on in.") if isinstance(first, Outcome) else first
 
 
-def _named(scenario: Scenario, state: str | None) -> tuple[str, Steady]:
+def _named(scenario: Scenario, request: Request) -> tuple[str, Steady]:
     """The state of this name; without a name the default one where there is one, else the trivial one. With its name."""
-    name = state or StateName.DEFAULT
+    state = request.state
+    # States with a ring lead on from the sphere at rest, not from the swimmer that is the default without one.
+    rests = request.course.moved == "ring_amplitude" and scenario.values()["ring_amplitude"] == 0.0
+    name = state or (StateName.TRIVIAL if rests else StateName.DEFAULT)
     found = steady(scenario, state=name)
     if state is None and not found.outcome.is_success and StateName.TRIVIAL in state_names(scenario.model):
         name = StateName.TRIVIAL
