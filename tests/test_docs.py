@@ -76,7 +76,8 @@ def test_a_term_can_be_added_as_the_page_says():
 def test_a_map_is_read_as_the_page_says():
     axes = ("peclet=20:26:2", "inverse_hydrodynamic_length=1:2:2")
     store = ss.diagram(ss.scenario("polar-swimmer"), *axes, out="map", workers=1).store
-    names = run_blocks(ROOT / "docs" / "how-to" / "map-shape-space.md", {"store": store})
+    names = {"store": store}
+    exec(blocks(ROOT / "docs" / "how-to" / "map-shape-space.md", "python")[-1], names)
     assert names["found"].converged == 2
 
 

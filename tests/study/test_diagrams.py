@@ -191,6 +191,26 @@ def test_a_killed_client_leaves_no_process_and_loses_nothing(stored: Diagram, tm
         np.testing.assert_allclose(found.dataset[name], stored.dataset[name], rtol=1e-9, atol=1e-9, err_msg=str(name))
 
 
+def test_a_cluster_gives_the_same_map(stored: Diagram, tmp_path: Path):
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster:
+        found = diagram(
+            swimmer(), X, Y, states=("trivial", "default"), out=tmp_path / "d", dask=cluster.scheduler_address
+        )
+    for name in stored.dataset.data_vars:
+        np.testing.assert_allclose(found.dataset[name], stored.dataset[name], rtol=1e-9, atol=1e-9, err_msg=str(name))
+
+
+def test_no_scheduler_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("shapespace.study.cluster.SECONDS", 0.5)
+    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
+        with pytest.raises(InputError, match="no scheduler answers"):
+            diagram(swimmer(), X, Y, out=tmp_path / "d", dask=address)
+    assert not (tmp_path / "d").exists()
+
+
 def test_a_worker_meets_no_store(tmp_path: Path):
     with pytest.raises(StoreError, match="is not a directory"):
         compute_tile(tmp_path / "none", (0, 0))
@@ -222,6 +242,7 @@ def test_bad_axes_are_refused(tmp_path: Path, x: str, part: str):
     ("arguments", "part"),
     [
         ({"workers": 0}, "--workers 0"),
+        ({"workers": 2, "dask": "tcp://127.0.0.1:9"}, "give only one"),
         ({"states": ()}, "must name different states"),
         ({"states": ("default", "default")}, "must name different states"),
         ({"states": ("upside-down",)}, "upside-down"),

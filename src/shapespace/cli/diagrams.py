@@ -54,6 +54,10 @@ def diagram_command(
     workers: Annotated[
         int | None, Parameter(metavar="N", help="Processes on this machine; the default is one for each core.")
     ] = None,
+    dask: Annotated[
+        str | None,
+        Parameter(metavar="ADDRESS", help="Compute on the workers of this Dask scheduler, e.g. tcp://host:8786."),
+    ] = None,
     out: Annotated[
         Path | None, Parameter(metavar="DIR", help="New directory; the default is results/NAME-diagram.")
     ] = None,
@@ -74,7 +78,7 @@ def diagram_command(
         with ProgressDisplay() as display:
             rate = _Rate(display, path)
             found = diagram(
-                chosen, x, y, out=path, states=state.split(","), stability=stability, workers=workers, resume=resume,
+                chosen, x, y, out=path, states=state.split(","), stability=stability, workers=workers, dask=dask, resume=resume,
                 ready=rate.begin, progress=rate.update,
             )  # fmt: skip
     except KeyboardInterrupt:

@@ -1,6 +1,6 @@
 """Maps of stationary states over two keys: a coarse skeleton first, then tile by tile, each from the skeleton alone."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ from shapespace.analysis.sweeping import Index, Sweep
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
+from shapespace.study.cluster import Cluster
 from shapespace.study.diagram_store import CODES, Anchors, Diagram, DiagramRequest, DiagramStore, open_diagram
 from shapespace.study.grid import Axis, Grid
 from shapespace.study.keyed import KeyedProblem
@@ -17,7 +18,7 @@ from shapespace.study.paths import StateName, read_state_name
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.steady import check_has_isolated_states, key_values, solve_steady
-from shapespace.study.tiles import Done, Surveyor, compute_tile, observable_names
+from shapespace.study.tiles import Done, Surveyor, observable_names
 from shapespace.study.workers import Workers, available_cores
 
 MAX_NAMED = 4
@@ -36,6 +37,7 @@ def diagram(
     states: Sequence[str] = ("default",),
     stability: bool = False,
     workers: int | None = None,
+    dask: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,
     ready: Callable[[int, int], None] | None = None,
@@ -43,24 +45,23 @@ def diagram(
     """Stationary states of a scenario over a grid of two keys, x and y as `key=from:to:count`, in a Zarr store.
 
     states: names of states, as of `steady`; each is followed from where it is found first. stability: store the number of
-    growing modes too. workers: processes, by default one for each core; the map does not depend on them. `out` is the
-    directory of the store, new or empty; with `resume` a store there is continued. ready: told how many points are done of
-    how many. InputError before anything is computed; where a process cannot be kept alive, WorkerError.
+    growing modes too. workers: processes, by default one for each core; dask: address of a scheduler whose workers compute
+    instead; the map does not depend on them. `out` is the directory of the store, new or empty; with `resume` a store there
+    is continued. ready: told how many points are done of how many. InputError before anything is computed; where a process
+    cannot be kept alive, WorkerError.
     """
     grid = Grid(*(Axis.read(one, flag) if isinstance(one, str) else one for flag, one in (("-x", x), ("-y", y))))
     request = make_request(scenario, grid, states, stability)
-    count = available_cores() if workers is None else workers
-    if count < 1:
-        raise InputError(f"--workers {count}: must be at least 1; give a larger number.")
+    engine = _engine(workers, dask)
     begin = DiagramStore.resume if resume and holds_store(out) else DiagramStore.create
-    with begin(out, scenario, request, observable_names(scenario, grid.keys)) as store:
+    with engine, begin(out, scenario, request, observable_names(scenario, grid.keys)) as store:
         missing = store.missing_tiles
         sizes = {tile: len(states) * _size(grid, tile) for tile in grid.tiles}
         if ready is not None:
             ready(sum(sizes.values()) - sum(sizes[tile] for tile in missing), sum(sizes.values()))
         for name in request.states[len(store) :]:
             store.append(make_anchors(scenario, grid, StateName(name)))
-        for done in _computed(store, missing, min(count, len(missing))):
+        for done in engine.map(store.path, missing):
             if progress is not None:
                 progress(done)
         if missing or store.outcome is None:
@@ -83,13 +84,16 @@ def _size(grid: Grid, tile: Index) -> int:
     return int(np.prod([one.stop - one.start for one in grid.span(tile)]))
 
 
-def _computed(store: DiagramStore, tiles: Sequence[Index], count: int) -> Iterator[Done]:
-    """Finished tiles, in this process or by workers."""
-    if count <= 1:
-        yield from (compute_tile(store.path, tile) for tile in tiles)
-        return
-    with Workers(count) as workers:
-        yield from workers.map(store.path, tiles)
+def _engine(workers: int | None, dask: str | None) -> Workers | Cluster:
+    """What computes tiles."""
+    if dask is not None:
+        if workers is not None:
+            raise InputError(f"--workers {workers} and --dask {dask}: the cluster has its own workers; give only one.")
+        return Cluster(dask)
+    count = available_cores() if workers is None else workers
+    if count < 1:
+        raise InputError(f"--workers {count}: must be at least 1; give a larger number.")
+    return Workers(count)
 
 
 def make_anchors(scenario: Scenario, grid: Grid, name: StateName) -> Anchors:

@@ -125,7 +125,7 @@ class AbstractRecordStore(ABC, Generic[R]):
         reopened = {"status": "running", "outcome": None, cls.folder: None}
         if (manifest[cls.folder] or 0) > len(store):
             manifest |= reopened
-        session = {"at": _now(), cls.folder: len(store), "versions": _versions()}
+        session = {"at": _now(), cls.folder: len(store), "versions": own_versions()}
         store._unwritten = manifest | reopened | {"resumed": [*manifest["resumed"], session]}
         return store
 
@@ -275,7 +275,7 @@ class AbstractRecordStore(ABC, Generic[R]):
             "format": _FORMAT + cls.noun,
             "format_version": FORMAT_VERSION,
             "created": _now(),
-            "versions": _versions(),
+            "versions": own_versions(),
             "scales": {name: getattr(scales, name) for name in ("length", "energy", "time", "concentration")},
             "units": {name: scales.unit(name) for name in QUANTITIES},
             "note": cls.note,
@@ -363,7 +363,8 @@ def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
 
 
-def _versions() -> dict[str, str]:
+def own_versions() -> dict[str, str]:
+    """Of Python and of the packages that results depend on."""
     versions = {"python": platform.python_version()}
     for package in ("shapespace", "jax", "numpy"):
         try:

@@ -31,7 +31,7 @@ def available_cores() -> int:
 
 
 class Workers:
-    """So many processes, each busy with one tile at a time."""
+    """So many processes, each busy with one tile at a time; one alone is this one."""
 
     def __init__(self, count: int) -> None:
         self._answers: SimpleQueue[tuple[subprocess.Popen[str], str]] = SimpleQueue()
@@ -49,6 +49,9 @@ class Workers:
         The tile of a worker that dies is given to another one. StoreError as a worker met it; WorkerError where a tile
         costs MAX_DEATHS workers.
         """
+        if min(self._count, len(tiles)) <= 1:
+            yield from (compute_tile(path, tile) for tile in tiles)
+            return
         waiting, deaths = deque(tiles), Counter[Tile]()
         busy: dict[subprocess.Popen[str], Tile] = {}
         while waiting or busy:
