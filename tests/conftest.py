@@ -2,6 +2,7 @@
 
 import os
 import sys
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
@@ -15,6 +16,20 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
     if "jax" in sys.modules:
         raise pytest.UsageError("jax was imported before its cache was configured: a plugin must have loaded it.")
+
+
+@pytest.fixture
+def own_models() -> Iterator[None]:
+    """What a test defines of models, scenarios and quantities goes with it."""
+    from shapespace.base.scales import QUANTITIES
+    from shapespace.study.keys import MODELS
+    from shapespace.study.scenario import TEMPLATES
+
+    kept = [(table, dict(table)) for table in (QUANTITIES, MODELS, TEMPLATES)]
+    yield
+    for table, before in kept:
+        table.clear()
+        table.update(before)
 
 
 # The same examples every time, so that what passed passes again; `--hypothesis-profile=random` explores new ones.

@@ -41,8 +41,9 @@ ALLOWED: dict[str, frozenset[str]] = {
     "view": frozenset({"base", "study"}),
     "cli": frozenset({"base", "study", "view"}),
     "app": frozenset({"base", "study", "view"}),
-    # The front doors: public names re-exported, and `python -m shapespace`.
+    # The front doors: public names re-exported, those for models of one's own, and `python -m shapespace`.
     "__init__": frozenset({*MECHANICS, "analysis", "study", "view"}),
+    "modelling": frozenset({"physics", "study"}),
     "__main__": frozenset({"cli"}),
 }
 

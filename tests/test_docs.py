@@ -68,8 +68,10 @@ def test_a_store_is_read_without_the_package():
     assert [name for name in entries if f"`{name}`" not in page.read_text(encoding="utf-8")] == []
 
 
+@pytest.mark.usefixtures("short", "own_models")
 def test_a_term_can_be_added_as_the_page_says():
     run_blocks(ROOT / "docs" / "how-to" / "add-a-term.md")
+    assert {path.name for path in Path().glob("*.png")} == {"elastic-swimmer.png", "elastic-swimmer-budget.png"}
 
 
 @pytest.mark.usefixtures("short")
@@ -107,6 +109,9 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
         assert {word for word in arguments if "=" not in word} <= {*targets}
         return
     assert program == "shapespace", f"{page}: {command}"
+    if arguments[0] == "--import":
+        assert Path(arguments[1]).suffix == ".py"
+        arguments = arguments[2:]
     function, bound, _ = app.parse_args(arguments, exit_on_error=False, print_error=False)
     assert function.__name__ in {
         "list_scenarios",
@@ -127,7 +132,7 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
         if name.endswith(".toml"):
             Path(name).write_text(template("guided-division"))
             load_scenario(name).with_overrides(changes)
-        else:
+        elif "--import" not in command:
             _built_in(name, **changes)
 
 

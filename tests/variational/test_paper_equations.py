@@ -20,9 +20,7 @@ from shapespace.base.arrays import Array, Traced
 from shapespace.geometry.curve import Geometry
 from shapespace.geometry.motion import Rates, coordinate_flow
 from shapespace.geometry.parameterization import eulerian_rates, lagrangian_rates
-from shapespace.models import open_membrane
-from shapespace.models.closed_surface import make_closed_surface
-from shapespace.models.open_membrane import make_open_membrane
+from shapespace.models import closed_surface, open_membrane
 from shapespace.physics.activity import ActiveTension
 from shapespace.physics.force import Pressure
 from shapespace.physics.tension import Incompressibility
@@ -31,7 +29,7 @@ from shapespace.physics.viscosity import BulkViscosity
 from shapespace.variational.rayleighian import density
 from shapespace.variational.surface import SurfaceSystem
 
-SYSTEMS = {"closed": make_closed_surface(azimuthal=True), "open": make_open_membrane(azimuthal=True)}
+SYSTEMS = {"closed": closed_surface.RECIPE.system(azimuthal=True), "open": open_membrane.RECIPE.system(azimuthal=True)}
 SEEDS = (0, 1, 2)
 POINTS = 40
 ORDER = 6

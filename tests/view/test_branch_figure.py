@@ -51,7 +51,7 @@ def test_lines():
 
 
 def test_along_an_observable_the_one_that_answers_is_drawn():
-    scenario = SimpleNamespace(model="open-membrane")
+    scenario = SimpleNamespace(kind="open-membrane")
     point = SimpleNamespace(observables={"height": 0.7, "pulling_force": 3.0, "bending_energy": 20.0})
     for key, free, name in (
         ("height", "pulling_force", "pulling_force"),

@@ -148,6 +148,22 @@ QUANTITIES: dict[str, Quantity] = {
 }
 
 
+def read_dimension(text: str) -> Dimension:
+    """The dimension of a unit as the glossary writes it, `E T/L^2`, `1/L`, `1`. InputError where it is none."""
+    letters = {"L": "length", "E": "energy", "T": "time", "C": "concentration"}
+    exponents = dict.fromkeys(letters.values(), 0)
+    above, _, below = text.partition("/")
+    for part, sign in ((above, 1), (below.strip("() "), -1)):
+        for factor in part.split():
+            letter, _, power = factor.partition("^")
+            if letter == "1" and not power:
+                continue
+            if letter not in letters or not (power or "1").isdigit():
+                raise InputError(f"unit = {text!r}: must be of L, E, T, C and their powers, e.g. E T/L^2.")
+            exponents[letters[letter]] += sign * int(power or 1)
+    return Dimension(**exponents)
+
+
 _RADII = {"sphere_radius": "R0", "base_radius": "R_b", "area_radius": "R_A"}
 
 

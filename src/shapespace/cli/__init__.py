@@ -26,8 +26,8 @@ from shapespace.cli.shared import BAD_INPUT, INTERRUPTED, app, tell
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
-    tokens = _spread(sys.argv[1:] if arguments is None else arguments)
     try:
+        tokens = _spread(_imported(sys.argv[1:] if arguments is None else arguments))
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except InputError as error:
@@ -44,6 +44,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
     return status if isinstance(status, int) else 0
+
+
+def _imported(tokens: Sequence[str]) -> list[str]:
+    """The tokens without `--import FILE`, whose files were run: every command knows their models."""
+    left = list(tokens)
+    while any(token == "--import" or token.startswith("--import=") for token in left):
+        from shapespace.study.plugins import import_file
+
+        place = next(i for i, token in enumerate(left) if token == "--import" or token.startswith("--import="))
+        _, equals, file = left.pop(place).partition("=")
+        if not equals and place < len(left):
+            file = left.pop(place)
+        if not file:
+            raise InputError("--import: needs a Python file that defines models.")
+        import_file(file)
+    return left
 
 
 def _spread(tokens: Sequence[str]) -> list[str]:

@@ -33,8 +33,10 @@ if TYPE_CHECKING:
 @app.command(name="scenarios", help_epilogue=examples("shapespace scenarios"))
 def list_scenarios() -> None:
     """List the built-in scenarios."""
+    from shapespace.study.plugins import load_installed
     from shapespace.study.scenario import scenario_names, template
 
+    load_installed()
     for name in scenario_names():
         title = template(name).splitlines()[0].lstrip("# ")
         print(f"{name:<22}{title}")

@@ -37,7 +37,8 @@ def _version() -> str:
 
 app = App(
     name="shapespace",
-    help="Dynamics and stationary shapes of axisymmetric active fluid surfaces.",
+    help="Dynamics and stationary shapes of axisymmetric active fluid surfaces. "
+    "With every command: --import FILE.py, which defines models of your own.",
     help_epilogue=examples(
         "shapespace run guided-division",
         "shapespace plot results/guided-division",

@@ -4,6 +4,7 @@ from typing import Any
 
 from jax.numpy import pi
 
+from shapespace.models.recipe import Recipe
 from shapespace.physics.activity import ActiveTension
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.friction import TangentialFriction
@@ -13,7 +14,6 @@ from shapespace.physics.tension import IsotropicTension
 from shapespace.physics.term import AbstractTerm
 from shapespace.physics.viscosity import BulkViscosity, ShearViscosity
 from shapespace.variational.ends import Ends, Free, Pinned
-from shapespace.variational.surface import SurfaceSystem, make_surface_system
 
 PARAMETERS = (
     "bending_rigidity",
@@ -59,9 +59,5 @@ def species(p: Any) -> Species:
     return Species(p.diffusivity, p.turnover_rate, Ring(p.reference_concentration, p.ring_amplitude, p.ring_width))
 
 
-def make_closed_surface(azimuthal: bool = False) -> SurfaceSystem:
-    """A surface from pole to pole with enclosed volume, in the frame that swims along."""
-    ends = {**ENDS, "v_phi": (Pinned(), Pinned())} if azimuthal else ENDS
-    return make_surface_system(
-        PARAMETERS, terms, ends, species=species, fixed_volume=True, comoving=True, azimuthal=azimuthal
-    )
+RECIPE = Recipe(PARAMETERS, terms, ENDS, species=species, fixed_volume=True, comoving=True)
+"""A surface from pole to pole with enclosed volume, in the frame that swims along."""

@@ -5,6 +5,7 @@ from typing import Any
 from jax.numpy import pi
 
 from shapespace.base.arrays import Traced
+from shapespace.models.recipe import Recipe
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.force import AxialForce
 from shapespace.physics.friction import TangentialFriction
@@ -12,7 +13,6 @@ from shapespace.physics.patch import SmoothPatch, patch_integral
 from shapespace.physics.term import AbstractTerm
 from shapespace.physics.viscosity import ShearViscosity
 from shapespace.variational.ends import Ends, Free, Pinned, Traction
-from shapespace.variational.surface import SurfaceSystem, make_surface_system
 
 PARAMETERS = (
     "bending_rigidity",
@@ -53,7 +53,5 @@ def local_spontaneous_curvature(p: Any, area: Traced) -> Traced:
     return SmoothPatch(p.spontaneous_curvature, p.coat_area, p.coat_sharpness)(area)
 
 
-def make_open_membrane(azimuthal: bool = False) -> SurfaceSystem:
-    """A surface from the apex to a clamped rim that draws area from a reservoir at the boundary tension."""
-    ends = {**ENDS, "v_phi": (Pinned(), Pinned())} if azimuthal else ENDS
-    return make_surface_system(PARAMETERS, terms, ends, incompressible=True, azimuthal=azimuthal, material_area=True)
+RECIPE = Recipe(PARAMETERS, terms, ENDS, incompressible=True, material_area=True)
+"""A surface from the apex to a clamped rim that draws area from a reservoir at the boundary tension."""

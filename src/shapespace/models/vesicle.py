@@ -3,13 +3,12 @@
 from typing import Any
 
 from shapespace.models.closed_surface import ENDS
+from shapespace.models.recipe import Recipe
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.friction import NormalFriction, TangentialFriction
 from shapespace.physics.patch import Uniform
 from shapespace.physics.term import AbstractTerm
 from shapespace.physics.viscosity import BulkViscosity, ShearViscosity
-from shapespace.variational.ends import Ends, Pinned
-from shapespace.variational.surface import SurfaceSystem, make_surface_system
 
 PARAMETERS = (
     "bending_rigidity",
@@ -35,10 +34,12 @@ def terms(p: Any) -> tuple[AbstractTerm, ...]:
     )
 
 
-def make_vesicle(azimuthal: bool = False) -> SurfaceSystem:
-    """A surface from pole to pole with enclosed volume and total area, in a frame that moves along."""
-    ends: Ends = {name: pair for name, pair in ENDS.items() if name != "species"}
-    ends = {**ends, "v_phi": (Pinned(), Pinned())} if azimuthal else ends
-    return make_surface_system(
-        PARAMETERS, terms, ends, fixed_volume=True, fixed_area=True, comoving=True, azimuthal=azimuthal
-    )
+RECIPE = Recipe(
+    PARAMETERS,
+    terms,
+    {name: pair for name, pair in ENDS.items() if name != "species"},
+    fixed_volume=True,
+    fixed_area=True,
+    comoving=True,
+)
+"""A surface from pole to pole with enclosed volume and total area, in a frame that moves along."""

@@ -18,7 +18,7 @@ class HelfrichBending(AbstractEnergy):
     rigidity: Traced
     spontaneous_curvature: AbstractProfile
 
-    def density(self, geometry: Geometry) -> Traced:
+    def density(self, geometry: Geometry, concentration: Traced | float = 0.0) -> Traced:
         """(kappa/2) (2H - C0)^2 [energy/length^2]."""
         return 0.5 * self.rigidity * (total_curvature(geometry) - self.spontaneous_curvature(geometry.area)) ** 2
 

@@ -24,7 +24,7 @@ class IsotropicTension(AbstractEnergy):
     ledger: ClassVar[Ledger] = Ledger.ENERGY
     tension: Traced
 
-    def density(self, geometry: Geometry) -> Traced:
+    def density(self, geometry: Geometry, concentration: Traced | float = 0.0) -> Traced:
         """gamma [energy/length^2]: the energy is gamma times the area."""
         return self.tension + 0.0 * geometry.r
 

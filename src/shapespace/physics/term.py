@@ -9,19 +9,21 @@ from typing import NamedTuple
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 
 from shapespace.base.arrays import Traced
 from shapespace.geometry.curve import Geometry, area_element
-from shapespace.geometry.motion import Rates, coordinate_flow
+from shapespace.geometry.motion import Rates, coordinate_flow, divergence
 
 
 class Site(NamedTuple):
-    """Everything known at one point of the surface: shape, rates w, their gradients w' = dw/du, concentration."""
+    """Everything known at one point of the surface: shape, rates w, their gradients w' = dw/du, concentration c, c'."""
 
     geometry: Geometry
     rates: Rates
     gradients: Rates
     concentration: Traced
+    concentration_slope: Traced | float = 0.0
 
 
 class Ledger(StrEnum):
@@ -56,15 +58,24 @@ class AbstractEnergy(AbstractTerm):
     """A free energy: final classes give its density; `energy_power` is its rate of change along any motion."""
 
     @abstractmethod
-    def density(self, geometry: Geometry) -> Traced:
+    def density(self, geometry: Geometry, concentration: Traced | float = 0.0) -> Traced:
         """Energy per area [energy/length^2]."""
 
 
 def energy_power(energy: AbstractEnergy, site: Site) -> Traced:
     """d/dt at fixed u of (f r h), a directional derivative along the rates (Eqs. dtFequi, dtfk).
 
-    The cumulative area of an incompressible surface is a material label, so at fixed u it changes by -h q^u r.
+    The cumulative area of an incompressible surface is a material label, so at fixed u it changes by -h q^u r. The species
+    is carried along and diluted, so that c changes by -q^u c' - c div v; what diffusion and turnover change is no motion.
     """
     g, w = site.geometry, site.rates
     direction = Geometry(w.r, w.psi, site.gradients.psi, w.h, -coordinate_flow(g, w) * g.r)
-    return jax.jvp(lambda x: energy.density(x) * area_element(x), (g,), (direction,))[1]
+    at, along = (g, site.concentration), (direction, carried_rate(site))
+    return jax.jvp(lambda x, c: energy.density(x, c) * area_element(x), at, along)[1]
+
+
+def carried_rate(site: Site) -> Traced:
+    """dc/dt at fixed u of a species that is carried along and diluted: -q^u c' - c div v."""
+    g, w = site.geometry, site.rates
+    slope = jnp.asarray(site.concentration_slope)
+    return -coordinate_flow(g, w) * slope / g.h - site.concentration * divergence(g, w, site.gradients)

@@ -259,7 +259,7 @@ def _named(scenario: Scenario, request: Request) -> tuple[str, Steady]:
     rests = request.course.moved == "ring_amplitude" and scenario.values()["ring_amplitude"] == 0.0
     name = state or (StateName.TRIVIAL if rests else StateName.DEFAULT)
     found = steady(scenario, state=name)
-    if state is None and not found.outcome.is_success and StateName.TRIVIAL in state_names(scenario.model):
+    if state is None and not found.outcome.is_success and StateName.TRIVIAL in state_names(scenario.kind):
         name = StateName.TRIVIAL
         found = steady(scenario, state=name)
     return str(name), found

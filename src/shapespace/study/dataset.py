@@ -58,6 +58,7 @@ def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome |
     dataset.attrs |= {
         "scenario": scenario.name,
         "model": scenario.model,
+        "kind": scenario.kind,
         "outcome": str(outcome) if outcome else "unfinished",
         "parameters": json.dumps(scenario.values()),
         "conventions": CONVENTIONS,

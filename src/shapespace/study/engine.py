@@ -1,30 +1,41 @@
 """A scenario as a problem: the model's system on a mesh, its parameters and its initial state, all dimensionless."""
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from shapespace.base.arrays import Array
 from shapespace.geometry.spheroid import Spheroid
-from shapespace.models.closed_surface import make_closed_surface
-from shapespace.models.open_membrane import make_open_membrane
-from shapespace.models.vesicle import make_vesicle
+from shapespace.models import closed_surface, open_membrane, vesicle
+from shapespace.models.recipe import Recipe
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.state import State, state_from_functions
 from shapespace.study.frame import Frame
+from shapespace.study.keys import MODELS
 from shapespace.study.scenario import Scenario
 from shapespace.variational.surface import SurfaceSystem
 
-_SYSTEMS = {
-    ("closed-surface", False): make_closed_surface(),
-    ("closed-surface", True): make_closed_surface(azimuthal=True),
-    ("open-membrane", False): make_open_membrane(),
-    ("open-membrane", True): make_open_membrane(azimuthal=True),
-    ("vesicle", False): make_vesicle(),
-    ("vesicle", True): make_vesicle(azimuthal=True),
+_RECIPES = {
+    "closed-surface": closed_surface.RECIPE,
+    "open-membrane": open_membrane.RECIPE,
+    "vesicle": vesicle.RECIPE,
 }
+
+
+def recipe_of(model: str) -> Recipe:
+    """What a model is made of, a shipped one or a user's."""
+    own = MODELS[model].recipe
+    return _RECIPES[model] if own is None else own
+
+
+@cache
+def _system(recipe: Recipe, azimuthal: bool) -> SurfaceSystem:
+    """Made once: functions are compiled for each system anew."""
+    return recipe.system(azimuthal)
+
 
 BALL = 4.0 / 3.0 * np.pi
 
@@ -48,11 +59,11 @@ class Engine:
     def of(cls, scenario: Scenario) -> "Engine":
         """The engine of a scenario on its initial, uniform mesh."""
         numerics = scenario.numerics
-        system = _SYSTEMS[scenario.model, numerics.azimuthal_flow]
+        system = _system(recipe_of(scenario.model), numerics.azimuthal_flow)
         values = {"rotation_rate": 0.0, **scenario.dimensionless()}
-        if scenario.model == "closed-surface":
+        if scenario.kind == "closed-surface":
             values["enclosed_volume"] = BALL * values["sphere_radius"] ** 3
-        elif scenario.model == "vesicle":
+        elif scenario.kind == "vesicle":
             values["enclosed_volume"] = BALL * values["area_radius"] ** 3 * values["reduced_volume"]
             values["surface_area"] = 4.0 * np.pi * values["area_radius"] ** 2
             values["initial_oblate"] = float(scenario.values()["initial_oblate"])

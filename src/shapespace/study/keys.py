@@ -68,10 +68,16 @@ _CLOSED_TWINS = {
 
 
 class Model(NamedTuple):
-    """The records that a model needs, by section, and its twins."""
+    """The records that a model needs, by section, and its twins.
+
+    kind: the shipped model that it is, or is made from. recipe: what a user's model is made of (`models.recipe`); of
+    shipped ones the engine knows it, as names are looked up before the array library is loaded.
+    """
 
     sections: dict[str, type[Record]]
     twins: dict[str, Twin]
+    kind: str
+    recipe: Any = None
 
     @property
     def section_of(self) -> dict[str, str]:
@@ -92,14 +98,14 @@ class Model(NamedTuple):
         return next((name for name, twin in self.twins.items() if twin.sets == key), None)
 
 
-def _model(parameters: type[Record], initial: type[Record], twins: dict[str, Twin]) -> Model:
-    return Model({"parameters": parameters, "initial": initial, "run": RunSettings, "numerics": Numerics}, twins)
+def _model(kind: str, parameters: type[Record], initial: type[Record], twins: dict[str, Twin]) -> Model:
+    return Model({"parameters": parameters, "initial": initial, "run": RunSettings, "numerics": Numerics}, twins, kind)
 
 
 MODELS = {
-    "closed-surface": _model(ClosedSurfaceParameters, ClosedSurfaceInitial, _CLOSED_TWINS),
-    "open-membrane": _model(OpenMembraneParameters, OpenMembraneInitial, {}),
-    "vesicle": _model(VesicleParameters, VesicleInitial, {}),
+    "closed-surface": _model("closed-surface", ClosedSurfaceParameters, ClosedSurfaceInitial, _CLOSED_TWINS),
+    "open-membrane": _model("open-membrane", OpenMembraneParameters, OpenMembraneInitial, {}),
+    "vesicle": _model("vesicle", VesicleParameters, VesicleInitial, {}),
 }
 
 

@@ -320,6 +320,8 @@ class AbstractRecordStore(ABC, Generic[R]):
         try:
             return Scenario.from_dict(manifest["scenario"])
         except (InputError, KeyError, TypeError, AttributeError) as error:
+            if "--import" in str(error):
+                raise StoreError(f"{path}: {error}") from None
             raise StoreError(
                 f"{path / _MANIFEST}: is damaged (scenario: {error}); restore it, or {cls.noun} again with another --out."
             ) from None

@@ -29,11 +29,14 @@ from shapespace.study.parameters import (
     complaint,
     shown,
 )
+from shapespace.study.plugins import load_installed
 
 # What a resumed run may change: how far it goes, not what it computes.
 FREE_ON_RESUME = ("until", "max_steps")
 
 _NAMES = ("guided-division", "ring-slipping", "polar-swimmer", "membrane-protrusion", "vesicle")
+TEMPLATES: dict[str, str] = {}
+"""The TOML texts of scenarios that users defined, by name."""
 _SECTIONS = ("parameters", "initial", "run", "numerics")
 
 
@@ -85,6 +88,11 @@ class Scenario(Record):
         return type(self).from_keys(self.name, self.model, replace_keys(dict(self.given), overrides, self.model))
 
     @property
+    def kind(self) -> str:
+        """The shipped model that the scenario's model is, or is made from."""
+        return MODELS[self.model].kind
+
+    @property
     def scales(self) -> Scales:
         """The scales that make this scenario dimensionless."""
         return Scales.of(self.parameters.model_dump())
@@ -126,16 +134,20 @@ class Scenario(Record):
 
 
 def scenario_names() -> tuple[str, ...]:
-    """The built-in scenarios."""
-    return _NAMES
+    """The built-in scenarios, and those that users defined."""
+    return (*_NAMES, *TEMPLATES)
 
 
 def template(name: str) -> str:
-    """The commented TOML text of a built-in scenario."""
+    """The commented TOML text of a scenario by name."""
+    if name not in scenario_names():
+        load_installed()
+    if name in TEMPLATES:
+        return TEMPLATES[name]
     if name not in _NAMES:
-        close = difflib.get_close_matches(str(name).lower(), _NAMES, n=1, cutoff=0.0)[0]
+        close = difflib.get_close_matches(str(name).lower(), scenario_names(), n=1, cutoff=0.0)[0]
         raise InputError(
-            f"scenario {name!r}: there is none of this name; the nearest is {close}, all: {', '.join(_NAMES)}."
+            f"scenario {name!r}: there is none of this name; the nearest is {close}, all: {', '.join(scenario_names())}."
         )
     return resources.files("shapespace.study").joinpath("scenarios", f"{name}.toml").read_text(encoding="utf-8")
 
@@ -201,8 +213,13 @@ def _from_text(text: str) -> Scenario:
 
 
 def _check_model(model: object) -> None:
+    if isinstance(model, str) and model not in MODELS:
+        load_installed()
     if not isinstance(model, str) or model not in MODELS:
-        raise InputError(f"model = {shown(model)}: is unknown; the nearest valid one is {nearest(str(model), MODELS)}.")
+        own = "; a model of your own needs --import FILE" if isinstance(model, str) else ""
+        raise InputError(
+            f"model = {shown(model)}: is unknown; the nearest valid one is {nearest(str(model), MODELS)}{own}."
+        )
 
 
 def _check_section(section: str, entries: object, model: str) -> None:

@@ -127,7 +127,7 @@ class _Searcher:
     def guesses(self) -> Iterator[Guess]:
         """The resting shape in closed form, and the scenario's own states."""
         yield self._guess("reference", Engine.of(reference(self.scenario)).initial_state())
-        for name in own_states(self.scenario.model):
+        for name in own_states(self.scenario.kind):
             found = steady(self.scenario, state=name)
             yield self._guess(f"state {name}", found.problem.base.unpack(found.found.x))
 

@@ -167,7 +167,7 @@ def steady(
 
     start: `STORE` or `STORE:LABEL`, as text or as `find_start` returns it. The result's outcome says whether there is one.
     """
-    name = read_state_name(state, scenario.model)
+    name = read_state_name(state, scenario.kind)
     if start is None:
         return solve_steady(scenario, name)
     return steady_near(scenario, start if isinstance(start, Start) else find_start(start))
@@ -224,10 +224,10 @@ def solve_steady(scenario: Scenario, name: StateName = StateName.DEFAULT) -> Ste
     on the branch that leaves the sphere at the first pitchfork in the Peclet number.
     """
     check_has_isolated_states(scenario)
-    if scenario.model == "vesicle":
+    if scenario.kind == "vesicle":
         found, detail = solve_vesicle(scenario, name)
         return replace(_steady(scenario, found), detail=detail)
-    if scenario.model == "closed-surface":
+    if scenario.kind == "closed-surface":
         sphere = reference(scenario)
         if scenario.values()["ring_amplitude"] == 0.0:
             return _sphere(scenario, sphere) if name is StateName.TRIVIAL else _polarized(scenario, sphere)
@@ -239,9 +239,9 @@ def solve_steady(scenario: Scenario, name: StateName = StateName.DEFAULT) -> Ste
 
 def reference(scenario: Scenario) -> Scenario:
     """The scenario without ring, coat and pull: its initial state, a sphere or a flat disc, is at rest; a spheroid nearly so."""
-    if scenario.model == "vesicle":
+    if scenario.kind == "vesicle":
         return scenario.with_overrides({"initial_leaning": 0.0})
-    if scenario.model == "closed-surface":
+    if scenario.kind == "closed-surface":
         return scenario.with_overrides(
             {"ring_amplitude": 0.0, "initial_background": 1.0, "initial_ring_amplitude": 0.0, "seed_amplitude": 0.0}
         )
@@ -274,7 +274,7 @@ def _steady(scenario: Scenario, found: Stationary) -> Steady:
 
 
 def _main_key(scenario: Scenario) -> str:
-    return MAIN_KEYS[scenario.model]
+    return MAIN_KEYS[scenario.kind]
 
 
 def _sphere(scenario: Scenario, sphere: Scenario) -> Steady:
@@ -318,7 +318,7 @@ def _polarized(scenario: Scenario, sphere: Scenario) -> Steady:
 
 def check_has_isolated_states(scenario: Scenario) -> None:
     """InputError where stationary states come in families."""
-    if scenario.model == "closed-surface" and scenario.values()["turnover_rate"] == 0.0:
+    if scenario.kind == "closed-surface" and scenario.values()["turnover_rate"] == 0.0:
         raise InputError(
             "turnover_rate = 0: conserves the regulator, so that stationary states come in families that no equation tells "
             "apart; choose a turnover_rate > 0."

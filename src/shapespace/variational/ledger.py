@@ -11,13 +11,14 @@ from u = 0 to 1 (`boundary_power`): shape coordinates are held or free of force 
 
 import math
 
+import jax
 import jax.numpy as jnp
 
 from shapespace.base.arrays import Array, Traced
 from shapespace.geometry.curve import area_element, meridional_curvature, volume_element
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.force import AxialForce
-from shapespace.physics.term import CHANNELS, AbstractEnergy, AbstractTerm, Ledger
+from shapespace.physics.term import CHANNELS, AbstractEnergy, AbstractTerm, Ledger, Site, carried_rate
 from shapespace.variational.rayleighian import booked_power
 from shapespace.variational.surface import SurfaceSystem
 
@@ -37,7 +38,7 @@ def densities(
     found = {
         "area": element,
         "volume": volume_element(g),
-        "energy": sum((term.density(g) * element for term in energies), start=zero),
+        "energy": sum((term.density(g, site.concentration) * element for term in energies), start=zero),
         "bending_energy": sum((term.density(g) * element for term in bending), start=zero),
         "chemical_power": -2.0 * jnp.pi * booked_power(terms, Ledger.CHEMICAL, site),
         "force_power": -2.0 * jnp.pi * booked_power(terms, Ledger.EXTERNAL, site),
@@ -48,7 +49,16 @@ def densities(
     if system.species is not None:
         supply = dq[4] + system.field_values(dy)["species_flux"]
         found |= {"amount": element * site.concentration, "amount_supply": 2.0 * jnp.pi * supply}
+        found["chemical_power"] += 2.0 * jnp.pi * sum((_exchange(term, site, dq) for term in energies), start=zero)
     return found
+
+
+def _exchange(energy: AbstractEnergy, site: Site, dq: Traced) -> Traced:
+    """df/dc times what diffusion and turnover change of c r h: the energy that a species brings in other than by motion."""
+    g, w = site.geometry, site.rates
+    slope = jax.grad(energy.density, argnums=1)(g, site.concentration)
+    still = dq[4] - site.concentration * (w.r * g.h + g.r * w.h)
+    return slope * (still - carried_rate(site) * area_element(g))
 
 
 def channels(terms: tuple[AbstractTerm, ...]) -> tuple[Ledger, ...]:

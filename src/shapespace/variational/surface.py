@@ -122,7 +122,7 @@ class SurfaceSystem(AbstractSystem):
         # The density is linear in the gradients of dr/dt, dz/dt, dpsi/dt, dh/dt, so their values do not matter.
         gradients = Rates(zero, zero, zero, zero, df["v"], df.get("v_phi", zero))
         geometry = Geometry(f["r"], f["psi"], df["psi"], scalar["h"], f.get("area", zero))
-        return Site(geometry, rates, gradients, f.get("c", zero))
+        return Site(geometry, rates, gradients, f.get("c", zero), df.get("c", zero))
 
     def all_terms(self, a: Traced, s: Traced, p: Traced) -> tuple[AbstractTerm, ...]:
         """The model's terms and those of the constraints, whose multipliers are unknowns."""

@@ -55,7 +55,7 @@ def telling_observable(branch: Branch) -> str:
     """What answers along a branch in an observable, else the first of TELLING that changes."""
     if branch.free in branch.points[0].observables:
         return str(branch.free)
-    names = [name for name in TELLING[branch.scenario.model] if name != branch.key] or ["bending_energy"]
+    names = [name for name in TELLING[branch.scenario.kind] if name != branch.key] or ["bending_energy"]
     for name in names:
         if np.ptp([point.observables[name] for point in branch.points]) > LEAST_CHANGE:
             return name

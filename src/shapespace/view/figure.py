@@ -61,7 +61,7 @@ def layout_of(dataset: xr.Dataset) -> Layout:
     scenario = str(dataset.attrs.get("scenario", ""))
     if scenario in _LAYOUTS:
         return _LAYOUTS[scenario]
-    if (model := dataset.attrs.get("model")) in _BY_MODEL:
+    if (model := dataset.attrs.get("kind", dataset.attrs.get("model"))) in _BY_MODEL:
         return _LAYOUTS[_BY_MODEL[model]]
     curve = next((name for name in _GENERIC_CURVES if name in dataset), _GENERIC_CURVES[0])
     swims = curve != "velocity" and _swims(dataset)

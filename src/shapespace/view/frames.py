@@ -95,7 +95,7 @@ class Run:
 def read_run(dataset: xr.Dataset, observables: Iterable[str] = ()) -> Run:
     """The arrays of `dataset`, checked: at least 2 frames, time increases, all variables there and finite."""
     scenario = str(dataset.attrs.get("scenario", "unnamed"))
-    model = str(dataset.attrs.get("model", ""))
+    model = str(dataset.attrs.get("kind", dataset.attrs.get("model", "")))
     observables = tuple(observables)
     expected = REGULATORS.get(model)
     wanted = [*PROFILE_VARIABLES, *observables, *([expected] if expected else [])]

@@ -20,9 +20,9 @@ def draw_outline(
     Colours: the regulator's concentration, each state on its own scale, or the coat.
     """
     profile = profile_of(scenario, frame)
-    name = REGULATORS[scenario.model]
+    name = REGULATORS[scenario.kind]
     r, z, carried = profile["radius"], profile["axial_position"], profile[name]
-    colours = style.coat_map() if scenario.model == "open-membrane" else style.regulator_map()
+    colours = style.coat_map() if scenario.kind == "open-membrane" else style.regulator_map()
     for side in (1.0, -1.0):
         points = np.stack([at[0] + side * r, at[1] + z], axis=-1)
         segments = np.stack([points[:-1], points[1:]], axis=1)

@@ -1,0 +1,39 @@
+"""Where models that users make come from: files given by hand, and packages with the entry point `shapespace.models`."""
+
+import importlib.util
+import sys
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+from shapespace.base.errors import InputError
+
+GROUP = "shapespace.models"
+
+
+def import_file(path: str | Path) -> None:
+    """Run a Python file that defines models. InputError where there is none, or where it is not Python or not admissible."""
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"--import {path}: there is no such file; give a Python file that defines models.")
+    name = f"shapespace_import_{path.stem}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise InputError(f"--import {path}: is no Python file; end its name in .py.")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except (SyntaxError, ImportError, ValueError) as error:
+        del sys.modules[name]
+        raise InputError(f"--import {path}: {' '.join(str(error).split())}") from None
+
+
+@cache
+def load_installed() -> None:
+    """Load every installed package that registers models, once."""
+    for entry in metadata.entry_points(group=GROUP):
+        try:
+            entry.load()
+        except (SyntaxError, ImportError, AttributeError, ValueError) as error:
+            raise InputError(f"entry point {entry.name} of {GROUP}: {error}; mend or uninstall its package.") from None
