@@ -18,7 +18,6 @@ from shapespace.physics.activity import ActiveTension
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.force import AxialForce, Pressure
 from shapespace.physics.friction import NormalFriction, TangentialFriction
-from shapespace.physics.onsager import reaction_power, reduced_power, stationary_reaction_rate
 from shapespace.physics.patch import SmoothPatch, Uniform, patch_integral
 from shapespace.physics.species import Ring, Species
 from shapespace.physics.tension import FixedArea, Incompressibility, IsotropicTension
@@ -266,24 +265,6 @@ def test_every_power_is_booked_once():
     site, terms = random_site(6), (*LINEAR.values(), *DISSIPATIVE.values())
     booked = sum(booked_power(terms, ledger, site) for ledger in Ledger)
     assert_allclose(booked, density(terms, site), rtol=1e-12, atol=1e-12)
-
-
-# The flux-force flip.
-
-
-@examples
-@given(rate=signed, dilation=signed, coupling=signed, mobility=positive, potential=signed)
-def test_flux_force_flip(rate: float, dilation: float, coupling: float, mobility: float, potential: float):
-    """(constrp) makes the power stationary and least, which leaves xi Delta mu div v; the tension is xi Delta mu."""
-    constants = (coupling, mobility, potential)
-    stationary = stationary_reaction_rate(dilation, *constants)
-    assert_allclose(jax.grad(reaction_power)(stationary, dilation, *constants), 0.0, atol=1e-11)
-    least = reduced_power(dilation, *constants)
-    assert_allclose(reaction_power(stationary, dilation, *constants), least, rtol=1e-11, atol=1e-11)
-    gap = (rate - stationary) ** 2 / (2 * mobility)
-    assert_allclose(reaction_power(rate, dilation, *constants) - least, gap, rtol=1e-10, atol=1e-10)
-    for power in (reduced_power, lambda x, *c: reaction_power(stationary, x, *c)):
-        assert_allclose(jax.grad(power)(dilation, *constants), coupling * potential, rtol=1e-10, atol=1e-11)
 
 
 # The species.

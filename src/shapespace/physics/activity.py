@@ -1,8 +1,15 @@
-"""Active isotropic tension regulated by a species."""
+"""Active isotropic tension regulated by a species, with the reaction left out or shown (paper Sec. IV C, D)."""
 
+from abc import abstractmethod
 from typing import ClassVar
 
+import equinox as eqx
+import jax.numpy as jnp
+
 from shapespace.base.arrays import Traced
+from shapespace.geometry.curve import area_element
+from shapespace.geometry.motion import divergence
+from shapespace.physics.onsager import LinearLaws, reaction_laws
 from shapespace.physics.tension import tension_power
 from shapespace.physics.term import AbstractTerm, Ledger, Site
 
@@ -25,3 +32,69 @@ class ActiveTension(AbstractTerm):
     def power(self, site: Site) -> Traced:
         """xi Delta mu(c) div(v) r h."""
         return tension_power(self.tension(site.concentration), site)
+
+
+class Reaction(eqx.Module):
+    """The reaction behind an active tension: xi = (xi Delta mu)/Delta mu, mobility Lambda, potential Delta mu, at one point.
+
+    mobility: Lambda [1/(energy length^2 time)], > 0; potential: Delta mu [energy], not 0, held by the surroundings.
+    """
+
+    active: ActiveTension
+    mobility: Traced
+    potential: Traced
+
+    def laws(self, concentration: Traced) -> LinearLaws:
+        """tension = xi Delta mu, r_p = -xi div v + Lambda Delta mu."""
+        return reaction_laws(self.active.tension(concentration) / self.potential, self.mobility)
+
+    def rate(self, dilation: Traced, concentration: Traced) -> Traced:
+        """r_p [1/(length^2 time)] (Eq. constrp)."""
+        return self.laws(concentration).fluxes(jnp.stack([dilation, self.potential]))[1]
+
+
+class AbstractReactionTerm(AbstractTerm):
+    """A term in which the reaction rate r_p is the force, at the value that makes the functional stationary.
+
+    The functional has r_p in two terms, whose sum is xi Delta mu div(v) and a constant: at the stationary r_p the motion
+    that changes r_p changes the sum of both terms no further.
+    """
+
+    reaction: eqx.AbstractVar[Reaction]
+
+    @abstractmethod
+    def density(self, laws: LinearLaws, dilation: Traced, rate: Traced) -> Traced:
+        """Power per area, of the laws with odd forces, div v and r_p."""
+
+    def power(self, site: Site) -> Traced:
+        """The density times r h."""
+        dilation = divergence(site.geometry, site.rates, site.gradients)
+
+        def at(dilation: Traced, concentration: Traced) -> Traced:
+            laws, rate = self.reaction.laws(concentration), self.reaction.rate(dilation, concentration)
+            return self.density(laws.dissipative(), dilation, rate)
+
+        found = jnp.vectorize(at)(dilation, jnp.asarray(site.concentration))
+        return found * area_element(site.geometry)
+
+
+class ReactionDissipation(AbstractReactionTerm):
+    """Half of what the reaction dissipates, (r_p + xi div v)^2/(2 Lambda) (Eqs. CR1, CR2, disspart)."""
+
+    ledger: ClassVar[Ledger] = Ledger.REACTION
+    reaction: Reaction
+
+    def density(self, laws: LinearLaws, dilation: Traced, rate: Traced) -> Traced:
+        """The Rayleigh function of the flipped laws."""
+        return laws.rayleigh(jnp.stack([dilation, rate]))
+
+
+class ReactionSupply(AbstractReactionTerm):
+    """-r_p Delta mu: the chemical energy that the reaction takes up (Eq. dtFequi)."""
+
+    ledger: ClassVar[Ledger] = Ledger.CHEMICAL
+    reaction: Reaction
+
+    def density(self, laws: LinearLaws, dilation: Traced, rate: Traced) -> Traced:
+        """-r_p Delta mu."""
+        return -rate * self.reaction.potential
