@@ -25,11 +25,15 @@ def own_models() -> Iterator[None]:
     from shapespace.study.keys import MODELS
     from shapespace.study.scenario import TEMPLATES
 
+    variable = os.environ.pop("SHAPESPACE_IMPORT", None)
     kept = [(table, dict(table)) for table in (QUANTITIES, MODELS, TEMPLATES)]
     yield
     for table, before in kept:
         table.clear()
         table.update(before)
+    os.environ.pop("SHAPESPACE_IMPORT", None)
+    if variable is not None:
+        os.environ["SHAPESPACE_IMPORT"] = variable
 
 
 # The same examples every time, so that what passed passes again; `--hypothesis-profile=random` explores new ones.

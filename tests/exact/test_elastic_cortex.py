@@ -4,6 +4,8 @@ The tension K (c0/c - 1) is a passive one of slope z = -K/c0 in c (`sphere_rates
 on a mode: da/dt = M (F - Gamma_n da/dt), so that its mobility M becomes M/(1 + Gamma_n M).
 """
 
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +16,7 @@ from shapespace.base.errors import StoreError
 from shapespace.cli import main
 from shapespace.modelling import Parameter, define_model, define_scenario, dissipation, energy
 from shapespace.study.keys import MODELS
+from shapespace.study.plugins import import_file
 from shapespace.study.scenario import Scenario, load_scenario
 
 pytestmark = pytest.mark.usefixtures("own_models")
@@ -118,6 +121,14 @@ def test_branch_in_a_parameter_of_ones_own(plugin: Path):
     )
     forks = [point.parameter for point in found.special_points if point.kind == "pitchfork"]
     np.testing.assert_allclose(forks, [24.0 * 0.5 - 2.0 - 9.0], rtol=1e-7)
+
+
+def test_a_process_of_its_own_knows_what_was_imported(plugin: Path):
+    """As the workers of a diagram do, by the environment."""
+    import_file(plugin)
+    code = "import shapespace as ss; print(ss.scenario('elastic-swimmer').values()['area_modulus'])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "2.0"
 
 
 def test_bad_definitions_are_named():

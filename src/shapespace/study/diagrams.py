@@ -71,7 +71,7 @@ def diagram(
 
 def make_request(scenario: Scenario, grid: Grid, states: Sequence[str], stability: bool) -> DiagramRequest:
     """What is asked for, checked: InputError where it cannot be had."""
-    names = tuple(str(read_state_name(name, scenario.model)) for name in states)
+    names = tuple(str(read_state_name(name, scenario.kind)) for name in states)
     if not names or len(set(names)) < len(names):
         raise InputError(f"--state {','.join(states)}: must name different states; give each once.")
     for corner in grid.corners(scenario):

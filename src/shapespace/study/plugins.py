@@ -1,6 +1,7 @@
 """Where models that users make come from: files given by hand, and packages with the entry point `shapespace.models`."""
 
 import importlib.util
+import os
 import sys
 from functools import cache
 from importlib import metadata
@@ -9,6 +10,8 @@ from pathlib import Path
 from shapespace.base.errors import InputError
 
 GROUP = "shapespace.models"
+VARIABLE = "SHAPESPACE_IMPORT"
+"""Of the environment: files that define models, as in PATH; what this process imports, its workers import too."""
 
 
 def import_file(path: str | Path) -> None:
@@ -27,11 +30,15 @@ def import_file(path: str | Path) -> None:
     except (SyntaxError, ImportError, ValueError) as error:
         del sys.modules[name]
         raise InputError(f"--import {path}: {' '.join(str(error).split())}") from None
+    files = [file for file in os.environ.get(VARIABLE, "").split(os.pathsep) if file]
+    os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*files, str(path.resolve())]))
 
 
 @cache
 def load_installed() -> None:
-    """Load every installed package that registers models, once."""
+    """Load the files of the environment and every installed package that registers models, once."""
+    for file in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
+        import_file(file)
     for entry in metadata.entry_points(group=GROUP):
         try:
             entry.load()

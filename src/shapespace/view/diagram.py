@@ -58,7 +58,7 @@ def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
 
 def _telling(diagram: Diagram, states: xr.Dataset) -> str:
     """The first of TELLING that changes over the map."""
-    names = TELLING[diagram.scenario.model]
+    names = TELLING[diagram.scenario.kind]
     for name in names:
         if float(states[name].max() - states[name].min()) > LEAST_CHANGE:
             return name
