@@ -84,12 +84,12 @@ def solve_root(
         if size <= NEGLIGIBLE:
             return Root(x + step, Outcome.CONVERGED, iteration, jacobians, size, linearisation)
         trial = _damped_step(problem, linearisation, x, p, rate, step, size, newton)
-        contracts = trial is not None and (
-            trial.contraction <= newton.reuse_contraction
-            or (trial.contraction <= SLOW and trial.contraction * trial.error_left <= goal)
+        contracts_well = trial is not None and trial.contraction <= newton.reuse_contraction
+        contracts = contracts_well or (
+            trial is not None and trial.contraction <= SLOW and trial.contraction * trial.error_left <= goal
         )
         # Factors from another state are not trusted here: round-off may hide an error that they reduce slowly.
-        may_stagnate = not contracts and jacobians > 0 and size <= NEAR
+        may_stagnate = not contracts_well and jacobians > 0 and size <= (newton.tolerance if contracts else NEAR)
         if may_stagnate and size <= ROUND_OFF_SPREAD * _round_off(problem, linearisation, x, residual, p, rate):
             return Root(x + step, Outcome.CONVERGED, iteration, jacobians, size, linearisation)
         step = None
@@ -114,10 +114,11 @@ def _round_off(
 ) -> float:
     """A sample of what round-off in F and in the solution makes of a correction at x, in the problem's norm.
 
-    It is what the Jacobian does not explain of the change of F as each unknown moves to the next floating-point number.
+    It is what the Jacobian does not explain of the change of F as each unknown moves to a neighbouring floating-point
+    number: up or down without order, since a symmetric change says nothing of a nearly singular antisymmetric mode.
     Velocities are differences over a time step, so it grows as the step shrinks.
     """
-    moved = np.nextafter(x, np.inf)
+    moved = np.nextafter(x, np.random.default_rng(0).choice([-np.inf, np.inf], x.size))
     change = linearisation.solve(problem.residual(moved, p, rate) - residual)
     return problem.norm(change - (moved - x), x)
 
