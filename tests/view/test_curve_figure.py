@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from shapespace.view.curve import outline
+from shapespace.study.curve_store import outline
 
 
 def point(s: float) -> SimpleNamespace:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START, AbstractPathStore
 from shapespace.study.frame import Array, Frame, Layout
 from shapespace.study.scenario import Scenario
+
+PIECES = 16
+"""Straight pieces between neighbours of a drawn curve."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,3 +169,17 @@ def collected(
     """A curve from its points in the order in which they were computed."""
     ordered = tuple(sorted(points, key=lambda point: point.place))
     return Curve(outcome, scenario, keys, points[0].of if points else "", ordered, store, detail)
+
+
+def outline(points: Sequence[CurvePoint]) -> Array:
+    """The keys (2, m) along a curve, by cubics through neighbours with their tangents, so that a cusp looks like one."""
+    # Imported late: most readers of curves draw none.
+    from scipy.interpolate import CubicHermiteSpline
+
+    kept = [one for one, other in pairwise(points) if other.place > one.place] + [points[-1]]
+    if len(kept) == 1:
+        return kept[0].parameters[:, None]
+    places = np.array([point.place for point in kept])
+    spline = CubicHermiteSpline(places, [point.parameters for point in kept], [point.slope for point in kept])
+    fine = np.interp(np.arange(PIECES * (len(kept) - 1) + 1) / PIECES, np.arange(len(kept)), places)
+    return np.asarray(spline(fine).T)

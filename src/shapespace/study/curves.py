@@ -32,7 +32,7 @@ from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
 from shapespace.study.branching import FIRST_STEP
 from shapespace.study.curve_store import Curve, CurvePoint, CurveStore, collected
-from shapespace.study.engine import state_of
+from shapespace.study.engine import frame_of, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.keys import MODELS
@@ -40,7 +40,7 @@ from shapespace.study.landmarks import physical_end
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import Start, find_start
-from shapespace.study.steady import frame_of, key_values, observables_at
+from shapespace.study.steady import key_values, observables_at
 
 AT_VALUE = 1e-9
 """A start this near to a bound, relative to it (or one), is there."""

@@ -14,7 +14,7 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.scales import QUANTITIES
 from shapespace.models.open_membrane import local_spontaneous_curvature
 from shapespace.numerics.state import State
-from shapespace.study.engine import Engine, state_of
+from shapespace.study.engine import Engine, even_points, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.observables import FLOWS
 from shapespace.study.scenario import Scenario
@@ -113,7 +113,7 @@ def _fields(engine: Engine, frame: Frame) -> dict[str, Array]:
     """Dimensionless fields (point,) of one frame, sampled evenly over its elements."""
     system = engine.system
     state = state_of(frame)
-    u = np.interp(np.linspace(0.0, len(frame.mesh) - 1.0, POINTS), np.arange(len(frame.mesh)), frame.mesh)
+    u = even_points(frame.mesh, POINTS)
     y = dict(zip(system.fields, state.values(u).T, strict=True))
     dpsi = state.derivatives(u)[:, system.fields.index("psi")]
     h = frame.scalars[0]

@@ -155,3 +155,17 @@ class Engine:
 def state_of(frame: Frame) -> State:
     """The state that a frame holds."""
     return State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)
+
+
+def frame_of(problem: CollocationProblem, x: Array, observables: dict[str, float]) -> Frame:
+    """A state at rest as a frame."""
+    state = problem.unpack(x)
+    still = np.zeros((*state.slopes.shape[:2], 2))
+    return Frame(
+        0.0, 0.0, 0.0, state.mesh, state.nodes, state.slopes, state.algebraic, state.scalars, still, observables
+    )
+
+
+def even_points(mesh: Array, count: int) -> Array:
+    """Points u (count,) from 0 to 1, spread evenly over the elements of a mesh."""
+    return np.interp(np.linspace(0.0, len(mesh) - 1.0, count), np.arange(len(mesh)), mesh)

@@ -14,11 +14,12 @@ from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
 from shapespace.study.course import Course
+from shapespace.study.engine import frame_of
 from shapespace.study.keyed import HeldProblem, KeyedProblem
 from shapespace.study.observables import shape_end
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
-from shapespace.study.steady import Rates, frame_of, observables_at
+from shapespace.study.steady import Rates, observables_at
 
 HOPF, CHANGE = "hopf", "stability-change"
 """Kinds besides those of singular points: a pair of rates crosses the axis; the count of growing modes is not explained."""

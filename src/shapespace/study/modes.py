@@ -13,7 +13,7 @@ from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError, StoreError
 from shapespace.numerics.state import State
 from shapespace.study.branch_point import ComplexArray
-from shapespace.study.engine import Engine
+from shapespace.study.engine import Engine, even_points, state_of
 from shapespace.study.files import storage, write_atomically
 from shapespace.study.frame import DAMAGE, Frame, read_arrays, write_arrays
 from shapespace.study.scenario import Scenario
@@ -21,6 +21,8 @@ from shapespace.study.starts import find_start
 
 MODES_FILE = "modes.npz"
 """In the directory of a state that `steady` stored."""
+SAMPLES = 600
+"""Points of a mode's profiles, unless others are asked for."""
 CRITICAL = "critical"
 """Name of a neutral mode that no symmetry and no conservation law brings: the state is where stability changes."""
 
@@ -33,6 +35,24 @@ def neutral_modes(scenario: Scenario, neutral: Mapping[int, str]) -> list[dict[s
     held = Engine.of(scenario).system.held_symmetries
     found: list[dict[str, object]] = [{"name": name, "index": None} for name in held]
     return found + [{"name": name or CRITICAL, "index": place} for place, name in sorted(neutral.items())]
+
+
+@dataclass(frozen=True, eq=False)
+class ModeProfiles:
+    """A mode along u (m,) of its state: amplitudes a of changes Re(a exp(s t)), s the growth rate; dimensionless.
+
+    r, z, angle: of the state. displacement: x.n along the outward normal n = (sin psi, cos psi), in the moving frame.
+    tangential, normal: velocities in the lab frame, the normal one s x.n + v0 n_z. regulator: concentration, if there is one.
+    """
+
+    u: Array
+    r: Array
+    z: Array
+    angle: Array
+    displacement: ComplexArray
+    tangential: ComplexArray
+    normal: ComplexArray
+    regulator: ComplexArray | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +77,30 @@ class Modes:
             raise InputError(f"--mode {index}: is not stored; choose {last}.")
         base = Engine.of(self.scenario).problem.on_mesh(self.frame.mesh)
         return base.unpack(self.modes[index].real.copy()), base.unpack(self.modes[index].imag.copy())
+
+    def profiles(self, index: int, points: int = SAMPLES) -> ModeProfiles:
+        """A mode along the curve of its state, on points spread evenly over the elements. InputError as of `mode`."""
+        real, imaginary = self.mode(index)
+        engine, state = Engine.of(self.scenario), state_of(self.frame)
+        column = {name: i for i, name in enumerate(engine.system.fields)}
+        u = even_points(state.mesh, points)
+        base, change = state.values(u), real.values(u) + 1j * imaginary.values(u)
+        sin, cos = np.sin(base[:, column["psi"]]), np.cos(base[:, column["psi"]])
+        displacement = change[:, column["r"]] * sin + change[:, column["z"]] * cos
+        rate = complex(*self.growth_rates[index]) * self.scenario.scales.factor("time")
+        scalars = engine.system.scalars
+        i = scalars.index("v0") if "v0" in scalars else None
+        swim = 0.0 if i is None else complex(real.scalars[i], imaginary.scalars[i])
+        return ModeProfiles(
+            u=u,
+            r=base[:, column["r"]],
+            z=base[:, column["z"]],
+            angle=base[:, column["psi"]],
+            displacement=displacement,
+            tangential=change[:, column["v"]],
+            normal=rate * displacement + swim * cos,
+            regulator=change[:, column["c"]] if "c" in column else None,
+        )
 
 
 def store_modes(path: Path, modes: Modes) -> None:

@@ -13,7 +13,7 @@ from shapespace.analysis.stationary import Stationary, step_to
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.numerics.state import State
-from shapespace.study.engine import Engine, state_of
+from shapespace.study.engine import Engine, frame_of, state_of
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.landmarks import physical_end
 from shapespace.study.paths import NEWTON, own_states
@@ -25,7 +25,6 @@ from shapespace.study.starts import Start, find_starts
 from shapespace.study.steady import (
     Rates,
     check_has_isolated_states,
-    frame_of,
     key_values,
     observables_at,
     reference,

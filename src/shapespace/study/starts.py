@@ -1,20 +1,23 @@
-"""States to start from: the last frame of a stored run, a labelled point of a branch or curve, a state that a search found."""
+"""States to start from: a frame of a stored run, a point of a branch or a curve, a state of a search or in a diagram's tiles."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
+from typing import TypeVar
 
 from shapespace.base.errors import InputError, StoreError
 from shapespace.study.branch_point import BranchPoint
-from shapespace.study.branch_store import open_branch
-from shapespace.study.curve_store import open_curve
+from shapespace.study.branch_store import BranchStore, open_branch
+from shapespace.study.curve_store import CurveStore, open_curve
 from shapespace.study.frame import Frame
 from shapespace.study.keys import MODELS
-from shapespace.study.records import noun_of
+from shapespace.study.records import AbstractRecordStore, noun_of
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import open_search
 from shapespace.study.store import RunStore
+
+R = TypeVar("R")
 
 
 @dataclass(frozen=True)
@@ -53,12 +56,15 @@ class Start:
 
 
 def find_start(text: str | Path) -> Start:
-    """The state that `STORE` or `STORE:LABEL` names; without a label the last one, but of a search none.
+    """The state that `STORE` or `STORE:LABEL` names; without a label the last one, but of a search and a diagram none.
 
-    InputError where there is none.
+    A number as label is that of the record, from zero: a frame of a run, a point of a branch or a curve. In a diagram
+    `STATE-N` is a state in the middle of tile N. InputError where there is none.
     """
     path, label = _parts(text)
     noun = noun_of(path)
+    if noun == "diagram":
+        return _anchor(str(text), path, label)
     if noun == "search":
         search = open_search(path)
         frame = search[label].frame
@@ -66,18 +72,51 @@ def find_start(text: str | Path) -> Start:
         return Start(str(text), search.scenario, frame)
     if noun == "branch":
         branch = open_branch(path)
-        point = branch[label] if label else branch.points[-1]
+        point = _numbered(BranchStore, path, label) or (branch[label] if label else branch.points[-1])
         return Start(str(text), branch.scenario_at(point), point.frame, branch.key, point, (branch.free or branch.key,))
     if noun == "curve":
         curve = open_curve(path)
-        place = curve[label] if label else curve.points[-1]
+        place = _numbered(CurveStore, path, label) or (curve[label] if label else curve.points[-1])
         return Start(str(text), curve.scenario_at(place), place.frame, curve.keys[0], place.on_branch, curve.keys)
     run = RunStore.open(path)
-    if label:
-        raise InputError(f"--from {text}: a run has no labels; leave :{label} away to start from its last state.")
+    if label and not label.isdigit():
+        raise InputError(
+            f"--from {text}: a run has no labels; give the number of a frame, or leave :{label} away to start from the last one."
+        )
     if not len(run):
         raise StoreError(f"{path}: holds no time step yet; continue the run with --resume.")
-    return Start(str(text), run.scenario, run.read(-1))
+    return Start(str(text), run.scenario, _numbered(RunStore, path, label) or run.read(-1))
+
+
+def _numbered(kind: type[AbstractRecordStore[R]], path: Path, label: str) -> R | None:
+    """The record whose number the label is; None where it is no number."""
+    if not label.isdigit():
+        return None
+    try:
+        return kind.open(path).read(int(label))
+    except IndexError as error:
+        raise InputError(f"--from {path}:{label}: {error}") from None
+
+
+def _anchor(text: str, path: Path, label: str) -> Start:
+    """The state in the middle of a tile of a diagram, with the scenario there."""
+    # Imported late, as the others need neither the library of arrays on disk nor that of derivatives.
+    from shapespace.study.diagram_store import DiagramStore
+    from shapespace.study.engine import Engine, frame_of
+
+    store = DiagramStore.open(path)
+    grid = store.request.grid
+    known = {f"{anchors.state}-{i}": (anchors, i) for anchors in store for i, x in enumerate(anchors.xs) if len(x)}
+    if label not in known:
+        raise InputError(
+            f"--from {text}: is no state of this diagram; choose one of {', '.join(known) or 'another store, as it has none'}."
+        )
+    anchors, i = known[label]
+    tile = grid.tiles[i]
+    x, y = grid.values(grid.x.anchors[tile[0]], grid.y.anchors[tile[1]]).ravel().tolist()
+    scenario = store.scenario.with_overrides({grid.x.key: x, grid.y.key: y})
+    problem = Engine.of(scenario).problem.on_mesh(anchors.meshes[i])
+    return Start(text, scenario, frame_of(problem, anchors.xs[i], {}), keys=grid.keys)
 
 
 def find_starts(text: str | Path, scenario: Scenario) -> list[Start]:

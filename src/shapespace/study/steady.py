@@ -19,7 +19,7 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.state import State
-from shapespace.study.engine import Engine, state_of
+from shapespace.study.engine import Engine, frame_of, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.modes import Modes
@@ -140,15 +140,6 @@ def observables_at(scenario: Scenario, problem: CollocationProblem, x: Array) ->
     values = measure(engine, x, Rate.of_growth(problem.stored(x, engine.p)))
     values |= energy_law(values, 0.0)
     return {name: value * scenario.scales.factor(name) for name, value in values.items()}
-
-
-def frame_of(problem: CollocationProblem, x: Array, observables: dict[str, float]) -> Frame:
-    """A state at rest as a frame."""
-    state = problem.unpack(x)
-    still = np.zeros((*state.slopes.shape[:2], 2))
-    return Frame(
-        0.0, 0.0, 0.0, state.mesh, state.nodes, state.slopes, state.algebraic, state.scalars, still, observables
-    )
 
 
 def steady_from(scenario: Scenario, state: State, keys: tuple[str, ...] = ()) -> Steady:

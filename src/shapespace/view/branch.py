@@ -14,16 +14,10 @@ from shapespace.base.scales import QUANTITIES
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import Branch
 from shapespace.study.scenario import Scenario
+from shapespace.study.telling import most_telling
 from shapespace.view import style
 from shapespace.view.labels import label_points
 
-TELLING = {
-    "open-membrane": ("height",),
-    "closed-surface": ("velocity", "equator_radius"),
-    "vesicle": ("bending_energy",),
-}
-"""By model, observables in the order in which they are tried: the velocity of a symmetric surface tells nothing."""
-LEAST_CHANGE = 1e-6
 MARKS = {"fold": "s", "pitchfork": "D", "transcritical": "D", "branch-point": "D", "hopf": "o", "user": "|", "end": ""}
 """By kind; physical ends and stalls are crosses."""
 HEIGHT_MM = 110.0
@@ -55,11 +49,11 @@ def telling_observable(branch: Branch) -> str:
     """What answers along a branch in an observable, else the first of TELLING that changes."""
     if branch.free in branch.points[0].observables:
         return str(branch.free)
-    names = [name for name in TELLING[branch.scenario.kind] if name != branch.key] or ["bending_energy"]
-    for name in names:
-        if np.ptp([point.observables[name] for point in branch.points]) > LEAST_CHANGE:
-            return name
-    return names[-1]
+    return most_telling(
+        branch.scenario.kind,
+        lambda name: float(np.ptp([point.observables[name] for point in branch.points])),
+        (branch.key,),
+    )
 
 
 def stretches(points: Sequence[BranchPoint], name: str) -> list[list[BranchPoint]]:

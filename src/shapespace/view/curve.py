@@ -1,16 +1,12 @@
 """The figure of a curve: the plane of its two keys, with cusps and other special points marked and named."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from scipy.interpolate import CubicHermiteSpline
 
-from shapespace.study.curve_store import Curve, CurvePoint
-from shapespace.study.frame import Array
+from shapespace.study.curve_store import Curve, CurvePoint, outline
 from shapespace.view import style
 from shapespace.view.branch import quantity_label
 from shapespace.view.labels import label_points
@@ -28,8 +24,6 @@ MARKS = {
 }
 """By kind; physical ends and stalls are crosses."""
 HEIGHT_MM = 110.0
-PIECES = 16
-"""Straight pieces between neighbours."""
 
 
 def plot_curve(curve: Curve) -> Figure:
@@ -47,17 +41,6 @@ def plot_curve(curve: Curve) -> Figure:
         axes.legend(loc="best")
         label_points(axes, [(one.label, *one.parameters) for one in curve.special_points if one.kind != "end"])
     return figure
-
-
-def outline(points: Sequence[CurvePoint]) -> Array:
-    """The keys (2, m) along a curve, by cubics through neighbours with their tangents, so that a cusp looks like one."""
-    kept = [one for one, other in pairwise(points) if other.place > one.place] + [points[-1]]
-    if len(kept) == 1:
-        return kept[0].parameters[:, None]
-    places = np.array([point.place for point in kept])
-    spline = CubicHermiteSpline(places, [point.parameters for point in kept], [point.slope for point in kept])
-    fine = np.interp(np.arange(PIECES * (len(kept) - 1) + 1) / PIECES, np.arange(len(kept)), places)
-    return np.asarray(spline(fine).T)
 
 
 def _mark(axes: Axes, points: Sequence[CurvePoint]) -> None:

@@ -11,8 +11,9 @@ from matplotlib.patches import Patch
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, NOT_COMPUTED, OUTCOME, UNSTABLE, Diagram
+from shapespace.study.telling import most_telling
 from shapespace.view import style
-from shapespace.view.branch import LEAST_CHANGE, TELLING, quantity_label
+from shapespace.view.branch import quantity_label
 
 HEIGHT_MM = 90.0
 HATCH = "////"
@@ -58,11 +59,7 @@ def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
 
 def _telling(diagram: Diagram, states: xr.Dataset) -> str:
     """The first of TELLING that changes over the map."""
-    names = TELLING[diagram.scenario.kind]
-    for name in names:
-        if float(states[name].max() - states[name].min()) > LEAST_CHANGE:
-            return name
-    return names[-1]
+    return most_telling(diagram.scenario.kind, lambda name: float(states[name].max() - states[name].min()))
 
 
 def _scale(name: str, values: np.ndarray) -> tuple[Normalize, object]:

@@ -1,41 +1,22 @@
 """The figure of a mode: how a small perturbation displaces the outline, how it flows, and its profiles along the curve."""
 
-from dataclasses import dataclass
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from shapespace.base.arrays import Array
-from shapespace.study.engine import Engine, state_of
-from shapespace.study.modes import CRITICAL, Modes
+from shapespace.study.modes import CRITICAL, ModeProfiles, Modes
 from shapespace.view import style
 
 DISPLACEMENT = 0.12
 """Of the drawn mode at its largest, relative to the size of the surface; so long is the longest arrow, too."""
-SAMPLES = 600
 ARROWS = 13
 HEIGHT_MM = 95.0
 
 
-@dataclass(frozen=True)
-class _Profiles:
-    """Along u (m,): outline, angle; of the mode the normal displacement, tangential and normal velocity, regulator."""
-
-    u: Array
-    r: Array
-    z: Array
-    angle: Array
-    displacement: Array
-    tangential: Array
-    normal: Array
-    regulator: Array | None
-
-
 def plot_mode(modes: Modes, index: int) -> Figure:
     """Mode number `index`, 0 being the leading one; of a pair the real part."""
-    profiles = _profiles(modes, index)
+    profiles = modes.profiles(index)
     with style.house_style():
         figure = Figure(figsize=(style.WIDTH_MM * style.MM, HEIGHT_MM * style.MM), layout="constrained")
         FigureCanvasAgg(figure)
@@ -46,44 +27,21 @@ def plot_mode(modes: Modes, index: int) -> Figure:
     return figure
 
 
-def _profiles(modes: Modes, index: int) -> _Profiles:
-    """The mode with v_n = Re(s x.n) + v0 n_z for the displacement x in the moving frame, n = (sin psi, cos psi)."""
-    real, imaginary = modes.mode(index)
-    engine, state = Engine.of(modes.scenario), state_of(modes.frame)
-    column = {name: i for i, name in enumerate(engine.system.fields)}
-    elements = len(state.mesh) - 1
-    u = np.interp(np.linspace(0.0, elements, SAMPLES), np.arange(elements + 1), state.mesh)
-    base, one, other = state.values(u), real.values(u), imaginary.values(u)
-    sin, cos = np.sin(base[:, column["psi"]]), np.cos(base[:, column["psi"]])
-    moves = [part[:, column["r"]] * sin + part[:, column["z"]] * cos for part in (one, other)]
-    growth, frequency = modes.growth_rates[index] * modes.scenario.scales.factor("time")
-    swim = dict(zip(engine.system.scalars, real.scalars, strict=True)).get("v0", 0.0)
-    return _Profiles(
-        u=u,
-        r=base[:, column["r"]],
-        z=base[:, column["z"]],
-        angle=base[:, column["psi"]],
-        displacement=moves[0],
-        tangential=one[:, column["v"]],
-        normal=growth * moves[0] - frequency * moves[1] + swim * cos,
-        regulator=one[:, column["c"]] if "c" in column else None,
-    )
-
-
-def _draw_outline(axes: Axes, modes: Modes, at: _Profiles) -> None:
+def _draw_outline(axes: Axes, modes: Modes, at: ModeProfiles) -> None:
     """The state, the state displaced either way, and arrows of the velocity that belongs to the first of these."""
     unit = modes.scenario.scales.factor("length")
     size = max(float(at.r.max()), 0.5 * float(np.ptp(at.z)))
     sin, cos = np.sin(at.angle), np.cos(at.angle)
-    largest = float(np.abs(at.displacement).max())
-    moved = DISPLACEMENT * size * at.displacement / largest if largest > 1e-9 * _largest(at) else 0.0 * at.u
+    displacement, tangential, normal = at.displacement.real, at.tangential.real, at.normal.real
+    largest = float(np.abs(displacement).max())
+    moved = DISPLACEMENT * size * displacement / largest if largest > 1e-9 * _largest(at) else 0.0 * at.u
     for side in (1.0, -1.0):
         for sign, colour, word in ((1.0, style.RED, "with the mode"), (-1.0, style.BLUE, "against it")):
             r, z = at.r + sign * moved * sin, at.z + sign * moved * cos
             axes.plot(unit * side * r, unit * z, color=colour, linewidth=0.9, label=word if side > 0.0 else None)
         label = "state" if side > 0.0 else None
         axes.plot(unit * side * at.r, unit * at.z, color=style.INK, linewidth=1.6, label=label)
-    v_r, v_z = at.tangential * cos + at.normal * sin, -at.tangential * sin + at.normal * cos
+    v_r, v_z = tangential * cos + normal * sin, -tangential * sin + normal * cos
     fastest = float(np.hypot(v_r, v_z).max())
     if fastest > 0.0:
         length = np.append(0.0, np.cumsum(np.hypot(np.diff(at.r), np.diff(at.z))))
@@ -104,12 +62,12 @@ def _draw_outline(axes: Axes, modes: Modes, at: _Profiles) -> None:
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
 
 
-def _draw_profiles(axes: Axes, at: _Profiles) -> None:
+def _draw_profiles(axes: Axes, at: ModeProfiles) -> None:
     """Each relative to its own largest value; what is zero throughout is left out."""
     curves = {
-        "normal displacement": (at.displacement, style.RED),
-        "tangential velocity": (at.tangential, style.GREEN),
-        "regulator concentration": (at.regulator, style.PURPLE),
+        "normal displacement": (at.displacement.real, style.RED),
+        "tangential velocity": (at.tangential.real, style.GREEN),
+        "regulator concentration": (None if at.regulator is None else at.regulator.real, style.PURPLE),
     }
     axes.axhline(0.0, color=style.FAINT, linewidth=0.6)
     for word, (values, colour) in curves.items():
@@ -120,9 +78,9 @@ def _draw_profiles(axes: Axes, at: _Profiles) -> None:
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
 
 
-def _largest(at: _Profiles) -> float:
+def _largest(at: ModeProfiles) -> float:
     parts = (at.displacement, at.tangential, at.regulator)
-    return max(float(np.abs(part).max()) for part in parts if part is not None)
+    return max(float(np.abs(part.real).max()) for part in parts if part is not None)
 
 
 def _title(modes: Modes, index: int) -> str:
