@@ -22,7 +22,7 @@ from shapespace.study.scenario import load_scenario, scenario, scenario_names, t
 from shapespace.study.store import RunStore
 
 ROOT = Path(__file__).resolve().parents[1]
-COMMANDS = ("scenarios", "config", "run", "steady", "branch", "plot", "movie", "export", "check")
+COMMANDS = ("scenarios", "config", "run", "steady", "branch", "plot", "movie", "export", "check", "verify")
 RUN = ("run", "guided-division", "--dt", "0.1", "--until", "1")
 
 

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from shapespace.study.searching import search_states as search_states
     from shapespace.study.steady import Steady as Steady
     from shapespace.study.steady import steady as steady
+    from shapespace.study.verification.table import verify as verify
     from shapespace.view.show import movie as movie
     from shapespace.view.show import plot as plot
 
@@ -65,6 +66,7 @@ _HOMES = {
     "search_states": "study.searching",
     "Steady": "study.steady",
     "steady": "study.steady",
+    "verify": "study.verification.table",
     "movie": "view.show",
     "plot": "view.show",
 }

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from tests.classic import at_rest, bratu, chafee_infante
 
 from shapespace.analysis.bifurcation import (
     Kind,
@@ -17,6 +16,7 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.newton import Newton, solve_root
+from shapespace.study.verification.classic import at_rest, bratu, chafee_infante
 
 BRATU_FOLD = 3.513830719125161
 """8 (x^2 - 1) with x tanh x = 1 (Buckmire)."""

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyder, polyroots, polyval
 from tests.algebraic import AlgebraicProblem
-from tests.classic import at_rest, bratu, carrier, chafee_infante, chan, gelfand, mean_free, middle, neumann_bratu
+from tests.classic import carrier, middle
 
 from shapespace.analysis.bifurcation import SingularPoint, locate_branch_point, locate_fold
 from shapespace.analysis.branch import Bracket, Point, all_brackets, brackets, hermite
@@ -21,6 +21,15 @@ from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractContinuableProblem, AbstractSmoothProblem
 from shapespace.numerics.collocation import CollocationProblem
+from shapespace.study.verification.classic import (
+    at_rest,
+    bratu,
+    chafee_infante,
+    chan,
+    gelfand,
+    mean_free,
+    neumann_bratu,
+)
 
 BRATU_FOLD = 3.513830719125161
 LAMBDA = Parameter(0)

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from tests.algebraic import AlgebraicProblem
-from tests.classic import at_rest, bratu
 
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
@@ -19,6 +18,7 @@ from shapespace.analysis.tracing import traced
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractContinuableProblem, Rate
+from shapespace.study.verification.classic import at_rest, bratu
 
 TRANSFER = np.array([[-1.0, 0.3], [0.0, -3.0]])
 INPUT = np.array([1.0, 2.0])

@@ -2,7 +2,6 @@
 
 import jax.numpy as jnp
 import numpy as np
-from tests.classic import SecondOrder, at_rest, chan, mean_free
 
 from shapespace.analysis.bifurcation import Kind, SingularPoint, locate_branch_point
 from shapespace.analysis.branch import Point
@@ -18,6 +17,7 @@ from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.newton import Newton
 from shapespace.numerics.system import Symmetry
+from shapespace.study.verification.classic import SecondOrder, at_rest, chan, mean_free
 
 
 class OwnParameter(AbstractMeasure):
@@ -79,7 +79,10 @@ def test_a_curve_of_pitchforks():
     """y'' + lam (a y - y^3) = 0 on (0, pi): pitchforks at lam a = 1, followed in a; the unfolding stays zero."""
     mirror = Symmetry(False, (-1.0, -1.0), (0.0, 0.0))
     system = SecondOrder(
-        lambda x, y, p: p[0] * (p[1] * y - y**3) + 0.0 * jnp.sin(x), ("lam", "a"), length=float(np.pi), mirror=mirror
+        lambda x, y, p: p[0] * (p[1] * y - y**3) + 0.0 * jnp.sin(x),
+        parameters=("lam", "a"),
+        length=float(np.pi),
+        mirror=mirror,
     )
     problem = CollocationProblem(system, uniform_mesh(20), 4, 1e-8)
     x = at_rest(problem)

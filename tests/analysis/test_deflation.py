@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from tests.algebraic import AlgebraicProblem
-from tests.classic import at_rest, bratu, carrier, middle
+from tests.classic import carrier, middle
 
 from shapespace.analysis.bifurcation import Kind
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
@@ -29,6 +29,7 @@ from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractSmoothProblem, Rate
 from shapespace.numerics.collocation import CollocationProblem
+from shapespace.study.verification.classic import at_rest, bratu
 
 
 def by_modes(trial: Trial, amplitudes: Sequence[float] = (0.3,)) -> list[Guess]:

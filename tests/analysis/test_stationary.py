@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from tests.algebraic import AlgebraicProblem
-from tests.classic import at_rest, bratu, carrier, mean_free, middle
+from tests.classic import carrier, middle
 
 from shapespace.analysis.extended import AbstractMeasure, Affine, ExtendedProblem, Given, Parameter
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
@@ -14,6 +14,7 @@ from shapespace.base.problem import AbstractContinuableProblem, Rate
 from shapespace.numerics.adaptation import discretisation_error
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.newton import Newton, solve_root
+from shapespace.study.verification.classic import at_rest, bratu, mean_free
 
 TIGHT = Newton(1e-12)
 

@@ -1,11 +1,11 @@
 """States over two parameters of Chan's problem: as found one by one, none beyond the fold, and no other branch's."""
 
 import numpy as np
-from tests.classic import at_rest, chan
 
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.analysis.sweeping import Sweep
 from shapespace.base.outcome import Outcome
+from shapespace.study.verification.classic import at_rest, chan
 
 FOLD = 4.041401867
 """a, at b = 0.01; tests/classic.py."""

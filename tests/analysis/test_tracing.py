@@ -6,21 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.special import ellipk
-from tests.classic import (
-    SecondOrder,
-    at_rest,
-    bratu,
-    carrier,
-    chafee_infante,
-    chan,
-    circle,
-    gelfand,
-    mean_free,
-    middle,
-    neumann_bratu,
-    ring,
-    start_from,
-)
+from tests.classic import carrier, circle, middle, ring
 
 from shapespace.analysis.bifurcation import Kind
 from shapespace.analysis.branch import Point
@@ -33,6 +19,17 @@ from shapespace.base.outcome import Outcome
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.system import Symmetry
+from shapespace.study.verification.classic import (
+    SecondOrder,
+    at_rest,
+    bratu,
+    chafee_infante,
+    chan,
+    gelfand,
+    mean_free,
+    neumann_bratu,
+    start_from,
+)
 
 
 def branch_from(
@@ -141,7 +138,7 @@ def test_row_7_chafee_and_infante():
 def elastica() -> CollocationProblem:
     """theta'' + P sin theta = 0, theta'(0) = theta'(1) = 0 (row 8)."""
     mirror = Symmetry(False, (-1.0, -1.0), (0.0, 0.0))
-    system = SecondOrder(lambda x, y, p: p[0] * jnp.sin(y), ("load",), neumann=(True, True), mirror=mirror)
+    system = SecondOrder(lambda x, y, p: p[0] * jnp.sin(y), parameters=("load",), neumann=(True, True), mirror=mirror)
     return CollocationProblem(system, uniform_mesh(40), 4, 1e-8)
 
 

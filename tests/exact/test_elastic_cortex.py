@@ -1,6 +1,6 @@
 """Two laws written with the public interface, against closed forms: area elasticity, and drag along the normal.
 
-The tension K (c0/c - 1) is a passive one of slope z = -K/c0 in c (`sphere_rates`). Drag along the normal opposes the force F
+The tension K (c0/c - 1) is a passive one of slope z = -K/c0 in c (`closed_forms`). Drag along the normal opposes the force F
 on a mode: da/dt = M (F - Gamma_n da/dt), so that its mobility M becomes M/(1 + Gamma_n M).
 """
 

@@ -1,11 +1,11 @@
-"""Oscillations of the sphere set in where the pair of l = 2 crosses the imaginary axis: closed form in `sphere_rates`."""
+"""Oscillations of the sphere set in where the pair of l = 2 crosses the imaginary axis: closed form in `closed_forms`."""
 
 import numpy as np
 import pytest
-from tests.exact.sphere_rates import rate_matrix
 
 import shapespace as ss
 from shapespace.study.engine import Engine
+from shapespace.study.verification.closed_forms import rate_matrix
 
 
 @pytest.mark.slow

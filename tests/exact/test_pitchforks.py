@@ -11,9 +11,7 @@ from shapespace.numerics.newton import Newton, solve_root
 from shapespace.study.engine import Engine
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.scenario import Scenario, scenario
-
-BESSEL_ZERO = 3.8317059702075123
-"""j_{1,1}: the clamped disc buckles at the tension -j^2 kappa/R_b^2."""
+from shapespace.study.verification.closed_forms import buckling_tension, polar_onset
 
 
 def resting(case: Scenario, key: str) -> tuple[KeyedProblem, Array, Array, Array]:
@@ -34,8 +32,7 @@ def resting(case: Scenario, key: str) -> tuple[KeyedProblem, Array, Array, Array
 @pytest.mark.parametrize(("saturation", "turnover", "start"), [(1.0, 9.0, 21.0), (10.0, 45.0, 2390.0)])
 def test_the_sphere_polarizes_at_its_peclet_number(saturation: float, turnover: float, start: float):
     """Pe* = (2 + k R^2/D)/(c0 f'(c0)), a pitchfork: 22 for c_s = c0, k = 9; 2397.235 for c_s = 10 c0, k = 45."""
-    slope = 2.0 * saturation**2 / (1.0 + saturation**2) ** 2
-    exact = (2.0 + turnover) / slope
+    exact = polar_onset(saturation, turnover)
     case = scenario(
         "polar-swimmer",
         seed_amplitude=0.0,
@@ -58,8 +55,8 @@ def test_the_clamped_disc_buckles_at_its_tension():
     point = locate_branch_point(*_arguments(resting(case, "boundary_tension")))
     assert isinstance(point, SingularPoint)
     assert point.kind is Kind.PITCHFORK
-    assert abs(point.parameter + BESSEL_ZERO**2) < 1e-8
-    assert abs(point.parameter + BESSEL_ZERO**2) <= point.parameter_error
+    assert abs(point.parameter - buckling_tension()) < 1e-8
+    assert abs(point.parameter - buckling_tension()) <= point.parameter_error
 
 
 def _arguments(state: tuple[KeyedProblem, Array, Array, Array]) -> tuple[KeyedProblem, int, Array, Array, Array]:

@@ -2,17 +2,10 @@
 
 import numpy as np
 import pytest
-from scipy.special import i0, i1, k0, k1
 
 import shapespace as ss
 from shapespace.study.engine import state_of
-
-
-def point_response(tension: float, radius: float = 1.0, rigidity: float = 1.0) -> float:
-    """z0/F of a point force: [-ln 2 + gamma_E + ln(kR) + K0(kR) - B (I0(kR) - 1)]/(2 pi gamma), B = (1/(kR) - K1)/I1."""
-    x = np.sqrt(tension / rigidity) * radius
-    b = (1.0 / x - k1(x)) / i1(x)
-    return float((-np.log(2.0) + np.euler_gamma + np.log(x) + k0(x) - b * (i0(x) - 1.0)) / (2.0 * np.pi * tension))
+from shapespace.study.verification.closed_forms import point_response
 
 
 def test_the_pull_response_tends_to_that_of_a_point_force():

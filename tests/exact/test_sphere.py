@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from tests.exact.sphere_rates import modes, perturbed_sphere, polar_rate, pressure, rate_matrix
+from tests.exact.near_sphere import modes, perturbed_sphere
 from tests.surfaces import make_engine, march, resting
 
 from shapespace.base.arrays import Array
@@ -14,6 +14,7 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine
 from shapespace.study.run import run
 from shapespace.study.scenario import scenario
+from shapespace.study.verification.closed_forms import polar_rate, pressure, rate_matrix
 
 DEGREES = (1, 2, 3, 4)
 AMPLITUDE = 1e-4

@@ -1,13 +1,12 @@
 """Spectra of the sphere against its growth rates in closed form, l = 0..6: passive, active, with and without friction.
 
-The concentration's l = 0 decays with the turnover rate, l = 1 is the polar mode, each l >= 2 has two rates (sphere_rates.py).
+The concentration's l = 0 decays with the turnover rate, l = 1 is the polar mode, each l >= 2 has two rates (closed_forms.py).
 """
 
 from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from tests.exact.sphere_rates import polar_rate, rate_matrix
 from tests.surfaces import resting
 
 from shapespace.analysis.stability import Spectral, solve_spectrum
@@ -17,6 +16,7 @@ from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.newton import Newton, solve_root
 from shapespace.study.engine import Engine
 from shapespace.study.scenario import scenario
+from shapespace.study.verification.closed_forms import sphere_rates
 
 # Fast diffusion puts the concentration's decay among that of the shapes.
 CASES = {
@@ -53,10 +53,8 @@ def sphere(**constants: float) -> tuple[Engine, Array]:
 
 def exact_rates(v: Mapping[str, float]) -> tuple[Array, Array]:
     """Rates (m,), largest first, and their l (m,)."""
-    rates = [(complex(-v["turnover_rate"]), 0), (complex(polar_rate(v)), 1)]
-    rates += [(complex(s), l) for l in range(2, 40) for s in np.linalg.eigvals(rate_matrix(l, v))]
-    rates.sort(key=lambda pair: (-pair[0].real, -pair[0].imag))
-    return np.array([s for s, _ in rates]), np.array([l for _, l in rates])
+    degrees, rates = zip(*sphere_rates(v, 39), strict=True)
+    return np.array(rates), np.array(degrees)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -46,7 +46,7 @@ def test_near_the_sphere(c_0: float):
     """A sphere of area 4 pi that yields to l = 2, with the slowest rate that of l = 3 (l = 2 is held by the volume).
 
     p = -2 (6 - C0), sigma = p/2 - C0 (C0 - 2)/2, F = 8 pi (1 - C0/2)^2 - p dV, and the rate -s/(Gamma_n + 4/(1/eta_b + g)) with
-    s and g of tests/exact/sphere_rates.py, at C0 = 0. Deviations are of first order in 1 - v.
+    s and g of tests.exact.near_sphere.py, at C0 = 0. Deviations are of first order in 1 - v.
     """
     pressure = -2.0 * (6.0 - c_0)
     tension = 0.5 * pressure - 0.5 * c_0 * (c_0 - 2.0)

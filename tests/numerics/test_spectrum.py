@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import scipy.linalg
 from scipy.optimize import brentq
-from tests.classic import at_rest, bratu, chafee_infante, start_from
 
 from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
 from shapespace.base.arrays import Array, Traced
@@ -19,6 +18,7 @@ from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.newton import Newton, solve_root
 from shapespace.numerics.system import AbstractSystem
+from shapespace.study.verification.classic import at_rest, bratu, chafee_infante, start_from
 
 NONE = np.zeros(0)
 
@@ -230,9 +230,9 @@ def test_a_neighbour_tells_where_to_look():
 
 def test_neutral_rates_get_their_names():
     """y_t = y'' with no flux keeps its integral; y_t = y'' + 4 pi^2 y on periodic ends is a rotation's family."""
-    from tests.classic import SecondOrder
+    from shapespace.study.verification.classic import SecondOrder
 
-    system = SecondOrder(lambda x, y, p: p[0] * (y - y), ("unused",), neumann=(True, True))
+    system = SecondOrder(lambda x, y, p: p[0] * (y - y), parameters=("unused",), neumann=(True, True))
     problem = CollocationProblem(system, uniform_mesh(20), 4, 1e-8)
     x, p = at_rest(problem), np.array([1.0])
     one = start_from(problem, lambda u: np.stack([0 * u + 1, 0 * u], 1), lambda u: np.stack([0 * u, 0 * u], 1))

@@ -1,14 +1,4 @@
-"""Linear dynamics of a sphere of radius R with concentration c0, in closed form, and states a little off the sphere.
-
-Perturb R by a(t) P_l(cos theta) and c0 by b(t) P_l(cos theta). With the Hill law f = c^2/(c^2 + c_s^2), activity
-z = (xi Delta mu)_0 f'(c0) and tension T = gamma + (xi Delta mu)_0 f(c0), and
-
-    q = D l(l+1)/R^2 + k,    s = (l-1)(l+2) [T/R^2 + kappa l(l+1)/R^4],    g = l(l+1)/((l-1)(l+2) eta_s + Gamma R^2),
-
-    d/dt (a, b) = [[-(R^2 s/4)(1/eta_b + g), -R z/(2 eta_b)], [c0 R s/(2 eta_b), c0 z/eta_b - q]] (a, b),    l >= 2,
-
-and db/dt = (c0 z/eta_b - 2 D/R^2 - k) b for l = 1, where a is a translation.
-"""
+"""States a little off the sphere, and their modes: what `closed_forms` says grows or decays."""
 
 from collections.abc import Mapping
 
@@ -19,40 +9,6 @@ from tests.surfaces import State, fields_at
 from shapespace.base.arrays import Array
 from shapespace.numerics.state import state_from_functions
 from shapespace.study.engine import Engine
-
-
-def active_tension(v: Mapping[str, float]) -> tuple[float, float]:
-    """T and z of a sphere at c0."""
-    c0, c_s = v["reference_concentration"], v["saturation_concentration"]
-    hill, slope = c0**2 / (c0**2 + c_s**2), 2.0 * c0 * c_s**2 / (c0**2 + c_s**2) ** 2
-    return v["tension"] + v["active_tension"] * hill, v["active_tension"] * slope
-
-
-def pressure(v: Mapping[str, float]) -> float:
-    """2 T/R + kappa C0 (C0 R - 2)/R^2."""
-    radius, c_0 = v["sphere_radius"], v["spontaneous_curvature"]
-    return 2.0 * active_tension(v)[0] / radius + v["bending_rigidity"] * c_0 * (c_0 * radius - 2.0) / radius**2
-
-
-def polar_rate(v: Mapping[str, float]) -> float:
-    """Growth rate of l = 1."""
-    exchange = 2.0 * v["diffusivity"] / v["sphere_radius"] ** 2 + v["turnover_rate"]
-    return v["reference_concentration"] * active_tension(v)[1] / v["bulk_viscosity"] - exchange
-
-
-def rate_matrix(l: int, v: Mapping[str, float]) -> Array:
-    """The 2x2 matrix of (a, b) for l >= 2, at C0 = 0."""
-    radius, eta_b, c0 = v["sphere_radius"], v["bulk_viscosity"], v["reference_concentration"]
-    tension, z = active_tension(v)
-    q = v["diffusivity"] * l * (l + 1) / radius**2 + v["turnover_rate"]
-    s = (l - 1) * (l + 2) * (tension / radius**2 + v["bending_rigidity"] * l * (l + 1) / radius**4)
-    g = l * (l + 1) / ((l - 1) * (l + 2) * v["shear_viscosity"] + v["friction"] * radius**2)
-    return np.array(
-        [
-            [-(radius**2 * s / 4.0) * (1.0 / eta_b + g), -radius * z / (2.0 * eta_b)],
-            [c0 * radius * s / (2.0 * eta_b), c0 * z / eta_b - q],
-        ]
-    )
 
 
 def _displacements(l: int, u: Array) -> dict[str, Array | float]:

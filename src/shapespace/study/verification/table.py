@@ -1,0 +1,61 @@
+"""All benchmarks, and the running of them."""
+
+import os
+import platform
+from collections.abc import Callable
+from time import perf_counter
+
+from shapespace.study.records import own_versions
+from shapespace.study.verification import continuation, divisions, membranes, spheres
+from shapespace.study.verification.record import Benchmark, Result, Row, Verification
+from shapespace.study.verification.states import Absent
+
+BENCHMARKS = (
+    Benchmark("Sphere at rest", spheres.resting),
+    Benchmark("Passive sphere", spheres.passive),
+    Benchmark("Active sphere with friction", spheres.active),
+    Benchmark("Oscillating sphere", spheres.oscillating),
+    Benchmark("The sphere polarizes", spheres.polarization),
+    Benchmark("The sphere begins to oscillate", spheres.hopf, is_quick=False),
+    Benchmark("Clamped disc", membranes.buckling),
+    Benchmark("Pulled disc", membranes.pull, is_quick=False),
+    Benchmark("Tether", membranes.tether, is_quick=False),
+    Benchmark("Coated membrane, Fig. 3a", divisions.gibbs_loop, is_quick=False),
+    Benchmark("Vesicles", membranes.crossings),
+    Benchmark("Vesicles near the sphere", membranes.near_sphere),
+    Benchmark("Long vesicles", membranes.tubes, is_quick=False),
+    Benchmark("Guided division, Fig. 6", divisions.neck),
+    Benchmark("Guided division, Fig. 7b", divisions.folds),
+    Benchmark("Balances of a run", divisions.balances),
+    Benchmark("Folds of classic problems", continuation.folds),
+    Benchmark("Branch points of a classic problem", continuation.branch_points),
+)
+
+Progress = Callable[[str, float], None]
+"""Called before each benchmark with its title and the share that is done."""
+
+
+def verify(*, quick: bool = False, progress: Progress | None = None) -> Verification:
+    """Compute every benchmark, or the quick ones, and set the values beside closed forms and published numbers.
+
+    Nothing is stored. A benchmark that finds no value gives a row that fails and says why.
+    """
+    chosen = [one for one in BENCHMARKS if one.is_quick or not quick]
+    results = []
+    for number, benchmark in enumerate(chosen):
+        if progress is not None:
+            progress(benchmark.title, number / len(chosen))
+        results.append(measured(benchmark))
+    machine = f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    return Verification(tuple(results), own_versions(), machine, quick)
+
+
+def measured(benchmark: Benchmark) -> Result:
+    """The rows of a benchmark and their time."""
+    began = perf_counter()
+    rows: list[Row] = []
+    try:
+        rows.extend(benchmark.compute())
+    except (Absent, ValueError, LookupError, ArithmeticError) as trouble:
+        rows.append(Row("not computed", float("nan"), float("nan"), "", 0.0, " ".join(str(trouble).split())))
+    return Result(benchmark.title, tuple(rows), perf_counter() - began)
