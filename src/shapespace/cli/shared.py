@@ -143,10 +143,11 @@ def print_lines(*lines: "Table | str") -> None:
     """Text and tables on stdout."""
     from rich.console import Console
 
-    console = Console(highlight=False, soft_wrap=True, markup=False)
     for line in lines:
         # A table wider than the terminal is wrapped by it, which loses nothing; Rich would cut off words.
-        console.print(line, width=max(console.width, console.measure(line).maximum))
+        wide = Console(highlight=False, soft_wrap=True, markup=False, width=10_000)
+        needed = wide.measure(line).maximum
+        Console(highlight=False, soft_wrap=True, markup=False, width=max(needed, 1)).print(line)
 
 
 def print_observables(scenario: "Scenario", observables: Mapping[str, float]) -> None:

@@ -38,25 +38,24 @@ def verify(
     with ProgressDisplay() as display:
         display.start("computing what is known")
         done = run_benchmarks(quick=quick, progress=display.update)
-    print(json.dumps(done.as_dict(), allow_nan=False)) if as_json else print_lines(_table(done), "", done.verdict)
     if html is not None:
         with storage(html):
             write_atomically(html, verification_html(done).encode())
         print_lines(str(html))
+    print(json.dumps(done.as_dict(), allow_nan=False)) if as_json else print_lines(_table(done), "", done.verdict)
     return 0 if done.passed else 1
 
 
 def _table(done: "Verification") -> "Table":
     from rich.table import Table
+    from rich.text import Text
 
     from shapespace.view.verification import shown, small
 
-    table = Table(
-        "", "what", "value", "reference", "error", "tolerance", "time", "source", box=None, header_style="bold"
-    )
+    table = Table("", "what", "value", "reference", "error", "tolerance", "source", box=None, header_style="bold")
     for result in done.results:
-        table.add_row("", f"[bold]{result.title}[/]", "", "", "", "", f"{result.seconds:.1f} s", "")
+        table.add_row("", Text(f"{result.title} ({result.seconds:.1f} s)", style="bold"))
         for row in result.rows:
             numbers = (shown(row.value), shown(row.reference), small(row.error), small(row.tolerance))
-            table.add_row("ok" if row.passed else "FAILED", f"  {row.name}", *numbers, "", row.note or row.source)
+            table.add_row("ok" if row.passed else "FAILED", f"  {row.name}", *numbers, row.note or row.source)
     return table

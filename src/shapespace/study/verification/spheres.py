@@ -56,10 +56,12 @@ def oscillating() -> Iterator[Row]:
 def polarization() -> Iterator[Row]:
     """The sphere yields to l = 1 in a pitchfork."""
     case = scenario("polar-swimmer")
-    fork = special_point(branch(case, "peclet", 23.0, start=21.0, state="trivial"), "pitchfork")
+    found = branch(case, "peclet", 23.0, start=21.0, state="trivial", stability=False)
+    fork = special_point(found, "pitchfork")
     yield Row("Pe* of the pitchfork, k = 9", fork.parameter, polar_onset(1.0, 9.0), PAPER, 1e-9)
     case = scenario("polar-swimmer", saturation_concentration=10.0, turnover_rate=45.0)
-    fork = special_point(branch(case, "peclet", 2410.0, start=2390.0, state="trivial"), "pitchfork")
+    found = branch(case, "peclet", 2410.0, start=2390.0, state="trivial", stability=False)
+    fork = special_point(found, "pitchfork")
     yield Row("Pe* of the pitchfork, c_s = 10 c0, k = 45", fork.parameter, polar_onset(10.0, 45.0), PAPER, 1e-9)
 
 
