@@ -25,6 +25,7 @@ from shapespace.cli.shared import (
 )
 
 if TYPE_CHECKING:
+    from shapespace.study.curve_store import Curve
     from shapespace.study.diagram_store import Diagram
     from shapespace.study.tiles import Done
 
@@ -36,7 +37,8 @@ AXIS = "KEY=FROM:TO:COUNT"
     help_epilogue=examples(
         "shapespace diagram polar-swimmer -x peclet=25:300:40 -y inverse_hydrodynamic_length=0.1:10:40",
         "shapespace diagram guided-division -x ring_amplitude=0:4:20 -y peclet=200:450:20 --stability --workers 1",
-        "shapespace diagram polar-swimmer -x peclet=25:300:40 -y turnover_rate=5:15:40 --state trivial,default",
+        "shapespace diagram polar-swimmer -x peclet=15:60:30 -y turnover_rate=5:15:30 --state trivial,default --boundaries",
+        "shapespace plot results/polar-swimmer-diagram --observable regime",
         "shapespace plot results/polar-swimmer-diagram --observable velocity",
     ),
 )
@@ -51,6 +53,9 @@ def diagram_command(
         str, Parameter(metavar="NAMES", help="States to map, as of `steady`, with commas between them.")
     ] = "default",
     stability: Annotated[bool, Parameter(help="Store the number of growing modes of each state too.")] = False,
+    boundaries: Annotated[
+        bool, Parameter(help="Follow the folds and branch points that bound regions; drawn over the map by `plot`.")
+    ] = False,
     workers: Annotated[
         int | None, Parameter(metavar="N", help="Processes on this machine; the default is one for each core.")
     ] = None,
@@ -78,8 +83,9 @@ def diagram_command(
         with ProgressDisplay() as display:
             rate = _Rate(display, path)
             found = diagram(
-                chosen, x, y, out=path, states=state.split(","), stability=stability, workers=workers, dask=dask, resume=resume,
-                ready=rate.begin, progress=rate.update,
+                chosen, x, y, out=path, states=state.split(","), stability=stability, boundaries=boundaries,
+                workers=workers, dask=dask, resume=resume,
+                ready=rate.begin, progress=rate.update, curve_progress=rate.follow,
             )  # fmt: skip
     except KeyboardInterrupt:
         tell(f"interrupted; to continue: {again(path)}")
@@ -112,6 +118,10 @@ class _Rate:
         start = f"continuing {self._path} after {done} of {total} points" if done else f"starting {self._path}"
         self._display.start(start)
 
+    def follow(self, found: "Curve") -> None:
+        """Take note of a boundary."""
+        self._display.update(f"followed a curve of {found.of}s", is_notable=True)
+
     def update(self, tile: "Done") -> None:
         """Take note of a tile."""
         self.computed += tile.points
@@ -134,7 +144,22 @@ def _record(found: "Diagram", computed: int, seconds: float) -> dict[str, Any]:
         "converged": found.converged,
         "seconds": seconds,
         "points_per_second": computed / seconds,
+        "boundaries": [_boundary(one) for one in found.boundaries],
+        "unexplained": None if found.unexplained is None else len(found.unexplained),
         "failed": found.failed,
+    }
+
+
+def _boundary(found: "Curve") -> dict[str, Any]:
+    return {
+        "store": str(found.store),
+        "kind": found.of,
+        "keys": [*found.keys],
+        "points": sum(point.is_step for point in found.points),
+        "special_points": [
+            {"label": point.label, "parameters": dict(zip(found.keys, point.parameters.tolist(), strict=True))}
+            for point in found.special_points
+        ],
     }
 
 
@@ -145,5 +170,7 @@ def _summarise(found: "Diagram", computed: int, seconds: float) -> None:
     print_lines(
         f"{found.points} points: {found.converged} converged{', ' if ends else ''}{ends}",
         f"computed {computed} in {seconds:.1f} s, {computed / seconds:.1f} a second",
+        *(f"bounded by {one.of}s: {one.store}" for one in found.boundaries),
+        *([f"{len(found.unexplained)} changes between neighbours lie on no such curve"] if found.unexplained else []),
         f"stored in {found.store}",
     )

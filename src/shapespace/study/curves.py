@@ -1,6 +1,5 @@
 """Curves of folds and branch points in two keys of a scenario, with special points and physical ends."""
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
@@ -9,38 +8,31 @@ from typing import Any
 
 import numpy as np
 
-from shapespace.analysis.bifurcation import Kind, SingularPoint, parameter_error
+from shapespace.analysis.bifurcation import Kind, SingularPoint
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import MEMORY, Arclength, Continuation, Stop
 from shapespace.analysis.curves import (
     NotFound,
     Special,
-    branches_at,
-    is_unfolded,
     own_parameter,
-    parameters_at,
     start_curve,
-    system_of,
     traced_curve,
 )
 from shapespace.analysis.extended import Parameter
 from shapespace.analysis.passage import first_change, passed_start
-from shapespace.analysis.singular import SingularProblem
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
-from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
 from shapespace.study.branching import FIRST_STEP
+from shapespace.study.curve_recorder import Recorder
 from shapespace.study.curve_store import Curve, CurvePoint, CurveStore, collected
-from shapespace.study.engine import frame_of, state_of
-from shapespace.study.frame import Frame
+from shapespace.study.engine import state_of
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.keys import MODELS
-from shapespace.study.landmarks import physical_end
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import Start, find_start
-from shapespace.study.steady import key_values, observables_at
+from shapespace.study.steady import key_values
 
 AT_VALUE = 1e-9
 """A start this near to a bound, relative to it (or one), is there."""
@@ -56,7 +48,8 @@ Progress = Callable[[CurvePoint, int], None]
 class Request:
     """Which curve to follow, from the stored point `origin`, in two keys: that of the branch, and another from start to stop.
 
-    value: of the other key at the origin. at: its values for exact points.
+    value: of the other key at the origin. at: its values for exact points. within: values of the first key, where it leaves
+    which the curve ends.
     """
 
     origin: str
@@ -64,7 +57,8 @@ class Request:
     value: float
     start: float
     stop: float
-    at: tuple[float, ...]
+    at: tuple[float, ...] = ()
+    within: tuple[float, float] = (-np.inf, np.inf)
 
     def __post_init__(self) -> None:
         for name, one in (("--start", self.start), ("--stop", self.stop), *(("--at", one) for one in self.at)):
@@ -82,6 +76,11 @@ class Request:
         for one in self.at:
             if not low <= one <= high:
                 raise InputError(f"--at {one:g}: lies outside {low:g} to {high:g}; choose a value between.")
+
+    def described(self, kind: str) -> dict[str, Any]:
+        """For a store. kind: of the points."""
+        about = {"keys": [*self.keys], "of": str(kind), "origin": self.origin, "start": self.start, "stop": self.stop}
+        return {**about, "at": [*self.at]}
 
     def is_at(self, bound: float) -> bool:
         """Whether the curve begins at a bound."""
@@ -131,22 +130,14 @@ def curve(
     """
     known = find_start(origin)
     request = _request(known, key, stop, start, at)
-    scenario = known.scenario
+    scenario, singular = known.scenario, _singular(known, request)
     if out is None:
         if resume:
             raise InputError("resume = True: needs the directory of a stored curve; give it as out.")
         points: list[CurvePoint] = []
-        outcome = _follow(scenario, request, known, points, points.append, progress)
+        outcome = _follow(scenario, request, singular, points, points.append, progress)
         return collected(scenario, request.keys, points, outcome, None)
-    assert known.point is not None
-    described = {
-        "keys": [*request.keys],
-        "of": known.point.kind,
-        "origin": request.origin,
-        "start": request.start,
-        "stop": request.stop,
-        "at": [*request.at],
-    }
+    described = request.described(singular.kind)
     begin = CurveStore.resume if resume and holds_store(out) else CurveStore.create
     with begin(out, scenario, described) as store:
         points = [*store]
@@ -158,8 +149,36 @@ def curve(
             points.append(point)
 
         if store.outcome is None or not store.outcome.is_success:
-            store.finish(_follow(scenario, request, known, points, keep, progress))
+            store.finish(_follow(scenario, request, singular, points, keep, progress))
         return collected(scenario, request.keys, points, store.outcome, store.path)
+
+
+def curve_through(
+    scenario: Scenario,
+    point: SingularPoint,
+    bounds: tuple[tuple[float, float], tuple[float, float]],
+    out: Path,
+    origin: str,
+) -> Curve:
+    """The curve of a fold or branch point within bounds of both keys, stored in a new directory.
+
+    point: of a KeyedProblem of two keys, in the first of which it is one; `scenario` has their values there. origin: what it is,
+    in words.
+    """
+    problem = point.problem
+    assert isinstance(problem, KeyedProblem)
+    first, second = problem.keys
+    request = Request(origin, (first, second), float(point.p[1]), *bounds[1], within=bounds[0])
+    points: list[CurvePoint] = []
+    with CurveStore.create(out, scenario, request.described(point.kind)) as store:
+
+        def keep(one: CurvePoint) -> None:
+            store.append(one)
+            points.append(one)
+
+        outcome = _follow(scenario, request, point, points, keep, None)
+        store.finish(outcome)
+    return collected(scenario, request.keys, points, outcome, out)
 
 
 def _request(known: Start, key: str, stop: float, start: float | None, at: Sequence[float]) -> Request:
@@ -186,14 +205,13 @@ def _request(known: Start, key: str, stop: float, start: float | None, at: Seque
 def _follow(
     scenario: Scenario,
     request: Request,
-    known: Start,
+    origin: SingularPoint,
     done: Sequence[CurvePoint],
     keep: Callable[[CurvePoint], None],
     progress: Progress | None,
 ) -> Outcome:
     """Compute what is missing of a curve of which the points `done` are there; `keep` lengthens them."""
-    assert known.point is not None
-    recorder = _Recorder(scenario, request.keys, known.point.kind, done)
+    recorder = Recorder(scenario, request.keys, str(origin.kind), done, request.within)
 
     def record(point: CurvePoint) -> None:
         keep(point)
@@ -201,10 +219,10 @@ def _follow(
             progress(point, len(done))
 
     if not done:
-        first = _start(recorder, request, known.point)
+        first = start_curve(origin, 1, request.direction, request.options)
         if isinstance(first, Outcome):
             return first
-        record(recorder.record(first, START, (known.point.parameter_error, 0.0)))
+        record(recorder.record(first, START, (origin.parameter_error, 0.0)))
     outcome = Outcome.REACHED_STOP
     for leg in request.legs(done[0]):
         ended = next((Outcome(point.ends) for point in done if point.leg == leg and point.ends), None)
@@ -219,7 +237,7 @@ def _follow(
     return outcome
 
 
-def _leg(recorder: "_Recorder", request: Request, leg: int, done: Sequence[CurvePoint]) -> Iterator[CurvePoint]:
+def _leg(recorder: "Recorder", request: Request, leg: int, done: Sequence[CurvePoint]) -> Iterator[CurvePoint]:
     """New records of one leg, special points before the point after them."""
     past, stored = _past(recorder, leg, done)
     start, last = recorder.point(done[0]), past[-1]
@@ -260,20 +278,22 @@ def _leg(recorder: "_Recorder", request: Request, leg: int, done: Sequence[Curve
         yield recorder.record(last, continuation.outcome.value, ends=continuation.outcome, is_step=False)
 
 
-def _start(recorder: "_Recorder", request: Request, point: BranchPoint) -> Point | Outcome:
-    """The first point, at a stored fold or branch point."""
-    base = recorder.problem_on(point.frame)
+def _singular(known: Start, request: Request) -> SingularPoint:
+    """A stored fold or branch point as one in both keys."""
+    point = known.point
+    assert point is not None
+    problem = KeyedProblem.of(known.scenario, request.keys)
+    base = replace(problem, base=problem.base.on_mesh(point.frame.mesh))
     x = base.base.pack(state_of(point.frame))
     kernel = point.directions
     if point.kind == Kind.FOLD:
         along = point.tangent[:-1]
         kernel = along[None] / np.sqrt(base.weights(x) @ along**2)
     p = np.array([point.parameter, request.value])
-    singular = SingularPoint(Kind(point.kind), base, 0, x, p, point.parameter_error, kernel, point.directions)
-    return start_curve(singular, 1, request.direction, request.options)
+    return SingularPoint(Kind(point.kind), base, 0, x, p, point.parameter_error, kernel, point.directions)
 
 
-def _past(recorder: "_Recorder", leg: int, done: Sequence[CurvePoint]) -> tuple[list[Point], int]:
+def _past(recorder: "Recorder", leg: int, done: Sequence[CurvePoint]) -> tuple[list[Point], int]:
     """The last steps of a leg as points, and how many special points are stored after them."""
     places = [0, *(i for i, point in enumerate(done) if i and point.leg == leg and point.is_step)][-MEMORY:]
     stored = sum(point.leg == leg and not point.ends for point in done[places[-1] + 1 :])
@@ -281,103 +301,3 @@ def _past(recorder: "_Recorder", leg: int, done: Sequence[CurvePoint]) -> tuple[
     if leg and places[0] == 0:
         points[0] = points[0].reversed()
     return points, stored
-
-
-def _state(point: Point) -> Point:
-    """The state at a point of a curve by itself."""
-    system = system_of(point)
-    return Point(system.base, system.state(point.x), parameters_at(point), system.index, np.zeros(0))
-
-
-class _Recorder:
-    """Makes records of points and points of records."""
-
-    def __init__(self, scenario: Scenario, keys: tuple[str, str], of: str, done: Sequence[CurvePoint]) -> None:
-        self.scenario, self.keys, self.of = scenario, keys, of
-        self.leg = 0
-        self._problem = KeyedProblem.of(scenario, keys)
-        self._numbers = Counter(point.kind for point in done if point.label)
-        self._missed: list[dict[str, Any]] = []
-
-    def problem_on(self, frame: Frame) -> KeyedProblem:
-        """The scenario's problem on the mesh of a frame; the same one as long as the mesh is the same."""
-        if not np.array_equal(self._problem.base.mesh, frame.mesh):
-            self._problem = replace(self._problem, base=self._problem.base.on_mesh(frame.mesh))
-        return self._problem
-
-    def at(self, point: Point) -> Scenario:
-        """The scenario of a point; InputError where a key cannot have its value."""
-        return self.scenario.with_overrides(dict(zip(self.keys, parameters_at(point).tolist(), strict=True)))
-
-    def end(self, point: Point) -> Outcome | None:
-        """Why the curve ends before a point, if so."""
-        if is_unfolded(point):
-            return Outcome.UNFOLDED
-        try:
-            self.at(point)
-        except InputError:
-            return Outcome.OUT_OF_RANGE
-        return physical_end(_state(point))
-
-    def miss(self, one: NotFound) -> None:
-        """Note a bracket in which nothing was found, for the next record."""
-        ends = {"before": one.before, "after": one.after}
-        values = {f"parameters_{name}": parameters_at(point).tolist() for name, point in ends.items()}
-        self._missed.append({"kind": str(one.kind), **values})
-
-    def record(
-        self,
-        point: Point,
-        kind: str,
-        errors: tuple[float, float] | None = None,
-        ends: Outcome | None = None,
-        is_step: bool = True,
-    ) -> CurvePoint:
-        """A point with what is known of it; where it has a kind, it has a label and an error of its parameters."""
-        system, at = system_of(point), self.at(point)
-        state = _state(point)
-        assert isinstance(state.problem, KeyedProblem)
-        self._numbers[kind] += 1
-        label = kind if kind in ("", START) else f"{kind}-{self._numbers[kind]}"
-        if errors is None:
-            errors = (parameter_error(system, point.x, point.p), 0.0) if kind else (np.nan, np.nan)
-        pair = (np.append(system.kernel[0], 0.0),) if system.is_fold else branches_at(point)
-        missed, self._missed = tuple(self._missed), []
-        return CurvePoint(
-            frame=frame_of(state.problem.base, state.x, observables_at(at, state.problem.base, state.x)),
-            parameters=state.p,
-            parameter_errors=np.array(errors),
-            unfolding=0.0 if system.is_fold else float(point.x[-1]),
-            of=self.of,
-            arclength=point.arclength,
-            step=point.step,
-            test=point.test,
-            tangent=point.tangent,
-            kernel=system.kernel,
-            across=system.across,
-            directions=np.stack(pair),
-            leg=self.leg,
-            label=label,
-            kind=str(kind),
-            is_step=is_step,
-            ends="" if ends is None else ends.value,
-            missed=missed,
-        )
-
-    def point(self, record: CurvePoint) -> Point:
-        """A stored point as one to go on from."""
-        base = self.problem_on(record.frame)
-        x = base.base.pack(state_of(record.frame))
-        scalars = [record.parameters[0]] if len(record.kernel) == 1 else [record.parameters[0], record.unfolding]
-        system = SingularProblem(base, 0, record.kernel, record.across)
-        return Point(
-            system,
-            np.append(x, scalars),
-            record.parameters,
-            1,
-            record.tangent,
-            record.arclength,
-            record.step,
-            record.test,
-            label=record.kind,
-        )

@@ -22,13 +22,15 @@ from numpy.typing import NDArray
 from shapespace.base.errors import StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.base.scales import QUANTITIES
+from shapespace.study.curve_store import Curve, open_curve
 from shapespace.study.files import storage
 from shapespace.study.frame import Array, read_arrays, write_arrays
 from shapespace.study.grid import Axis, Grid
-from shapespace.study.records import AbstractRecordStore
+from shapespace.study.records import AbstractRecordStore, holds_store
+from shapespace.study.regimes import Regime
 from shapespace.study.scenario import Scenario
 
-OUTCOME, UNSTABLE = "outcome", "n_unstable"
+OUTCOME, UNSTABLE, REGIME = "outcome", "n_unstable", "regime"
 _OUTCOMES = (
     Outcome.CONVERGED,
     Outcome.NO_STATE,
@@ -44,6 +46,8 @@ _OUTCOMES = (
 CODES = {outcome: code for code, outcome in enumerate(_OUTCOMES, start=1)}
 """Numbers of outcomes in stores, which stay; 0 is a point that is not computed yet. Names are stored beside them."""
 NOT_COMPUTED = 0
+CURVES, BOUNDARIES = "curves", "boundaries.json"
+"""Beside the Zarr store: a folder of curves, and what is known of changes of the map that lie on none."""
 ABOUT_SOLUTION = {
     "correction": "size of the last Newton correction, relative to the state",
     "iterations": "Newton iterations",
@@ -176,6 +180,7 @@ class DiagramStore(AbstractRecordStore[Anchors]):
                 self._array(root, name, dims, np.nan, "f8", shape, chunks)
             if self.request.stability:
                 self._array(root, UNSTABLE, dims, np.nan, "f8", shape, chunks)
+            self._array(root, REGIME, dims, 0, "u1", shape, chunks)
             self._array(root, OUTCOME, dims, NOT_COMPUTED, "i1", shape, chunks)
             root.attrs.update(self._attributes())
             with warnings.catch_warnings():
@@ -202,6 +207,12 @@ class DiagramStore(AbstractRecordStore[Anchors]):
         if name == OUTCOME:
             meanings = ["not-computed", *CODES]
             return {"flag_values": [*range(len(meanings))], "flag_meanings": " ".join(meanings)}
+        if name == REGIME:
+            masks = {
+                "flag_masks": [*map(int, Regime)],
+                "flag_meanings": " ".join(one.words.replace(" ", "-") for one in Regime),
+            }
+            return {"long_name": "what the state is like; 0 where there is none", **masks}
         if name == UNSTABLE:
             return {"long_name": "number of growing modes"}
         if name in ABOUT_SOLUTION:
@@ -269,6 +280,28 @@ class Diagram:
     def converged(self) -> int:
         """Points with a state."""
         return int((self.dataset[OUTCOME] == CODES[Outcome.CONVERGED]).sum())
+
+    @property
+    def regimes(self) -> NDArray[np.int64]:
+        """What the states at each point (n_y, n_x) are like, all of them together: flags of `Regime`, 0 where there is none."""
+        x, y = self.request.grid.keys
+        codes = self.dataset[REGIME].transpose(..., y, x).to_numpy().astype(np.int64)
+        return np.asarray(np.bitwise_or.reduce(codes.reshape(-1, *codes.shape[-2:]), axis=0))
+
+    @cached_property
+    def boundaries(self) -> tuple[Curve, ...]:
+        """Curves of folds and branch points that bound its regions, as far as they were followed."""
+        paths = sorted(path for path in (self.store / CURVES).glob("*") if holds_store(path))
+        return tuple(open_curve(path) for path in paths)
+
+    @property
+    def unexplained(self) -> list[tuple[float, float]] | None:
+        """Values of both keys where neighbours differ in kind and no boundary passes; None before boundaries were followed."""
+        path = self.store / BOUNDARIES
+        with storage(path):
+            if not path.exists():
+                return None
+            return [(x, y) for x, y in json.loads(path.read_text())["unexplained"]]
 
     @property
     def failed(self) -> list[dict[str, Any]]:

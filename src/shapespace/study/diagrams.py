@@ -10,6 +10,8 @@ from shapespace.analysis.sweeping import Index, Sweep
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
+from shapespace.study.boundaries import Progress as CurveProgress
+from shapespace.study.boundaries import follow_boundaries
 from shapespace.study.cluster import Cluster
 from shapespace.study.diagram_store import CODES, Anchors, Diagram, DiagramRequest, DiagramStore, open_diagram
 from shapespace.study.grid import Axis, Grid
@@ -36,19 +38,22 @@ def diagram(
     out: str | Path,
     states: Sequence[str] = ("default",),
     stability: bool = False,
+    boundaries: bool = False,
     workers: int | None = None,
     dask: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,
+    curve_progress: CurveProgress | None = None,
     ready: Callable[[int, int], None] | None = None,
 ) -> Diagram:
     """Stationary states of a scenario over a grid of two keys, x and y as `key=from:to:count`, in a Zarr store.
 
     states: names of states, as of `steady`; each is followed from where it is found first. stability: store the number of
-    growing modes too. workers: processes, by default one for each core; dask: address of a scheduler whose workers compute
-    instead; the map does not depend on them. `out` is the directory of the store, new or empty; with `resume` a store there
-    is continued. ready: told how many points are done of how many. InputError before anything is computed; where a process
-    cannot be kept alive, WorkerError.
+    growing modes too. boundaries: follow the folds and branch points that bound its regions, also of a diagram that is
+    complete; they come with `Diagram.boundaries`. workers: processes, by default one for each core; dask: address of a
+    scheduler whose workers compute instead; the map does not depend on them. `out` is the directory of the store, new or
+    empty; with `resume` a store there is continued. ready: told how many points are done of how many. InputError before
+    anything is computed; where a process cannot be kept alive, WorkerError.
     """
     grid = Grid(*(Axis.read(one, flag) if isinstance(one, str) else one for flag, one in (("-x", x), ("-y", y))))
     request = make_request(scenario, grid, states, stability)
@@ -66,6 +71,9 @@ def diagram(
                 progress(done)
         if missing or store.outcome is None:
             store.finish(Outcome.COMPLETE)
+        found = open_diagram(out)
+        if boundaries and found.unexplained is None:
+            follow_boundaries(store, found, curve_progress)
     return open_diagram(out)
 
 

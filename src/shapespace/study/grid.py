@@ -51,6 +51,11 @@ class Axis:
         return np.linspace(self.start, self.stop, self.count)
 
     @property
+    def step(self) -> float:
+        """Between neighbouring values."""
+        return (self.stop - self.start) / (self.count - 1)
+
+    @property
     def edge(self) -> int:
         """Points of a tile along this axis."""
         return math.ceil(self.count / max(1 + (self.count >= WORTH_CUTTING), math.ceil(self.count / LARGEST_EDGE)))
@@ -103,6 +108,10 @@ class Grid:
     def span(self, tile: tuple[int, int]) -> tuple[slice, slice]:
         """The points of a tile."""
         return self.x.span(tile[0]), self.y.span(tile[1])
+
+    def tile_of(self, at: tuple[int, int]) -> tuple[int, int]:
+        """The tile of a point."""
+        return at[0] // self.x.edge, at[1] // self.y.edge
 
     def corners(self, scenario: Scenario) -> list[Scenario]:
         """The scenario at the corners; InputError where the keys or their values are none that it takes."""

@@ -8,18 +8,32 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shapespace.analysis.passage import is_symmetric
 from shapespace.analysis.stability import Spectrum
 from shapespace.analysis.stationary import Stationary
-from shapespace.analysis.sweeping import Sweep
+from shapespace.analysis.sweeping import Index, Sweep
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
-from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, OUTCOME, UNSTABLE, Anchors, DiagramStore
+from shapespace.study.diagram_store import (
+    ABOUT_SOLUTION,
+    CODES,
+    OUTCOME,
+    REGIME,
+    UNSTABLE,
+    Anchors,
+    Diagram,
+    DiagramStore,
+)
 from shapespace.study.engine import Engine
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.observables import measure, shape_end
+from shapespace.study.regimes import regime_of
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
+
+TELLING = 1e-6
+"""States whose area and length differ by less, relative to them, are the same."""
 
 Tile = tuple[int, int]
 
@@ -46,8 +60,14 @@ def compute_tile(path: str | Path, tile: Tile) -> Done:
 
 def _survey(store: DiagramStore, anchors: Anchors, tile: Tile) -> dict[str, Array]:
     """Arrays (n_x, n_y) of a tile's points, in one of the states."""
+    surveyor = Surveyor(store.scenario, store.request.grid.keys, store.request.stability)
+    own = anchors.outcomes[store.request.grid.tiles.index(tile)]
+    return surveyor.survey(_sweep(store, surveyor, anchors, tile), own)
+
+
+def _sweep(store: DiagramStore, surveyor: "Surveyor", anchors: Anchors, tile: Tile) -> Sweep:
+    """The states at a tile's points."""
     grid = store.request.grid
-    surveyor = Surveyor(store.scenario, grid.keys, store.request.stability)
     sweep = Sweep(grid.values(*grid.span(tile)))
     tiles = {one: number for number, one in enumerate(grid.tiles)}
     for near in _around(tile):
@@ -63,7 +83,30 @@ def _survey(store: DiagramStore, anchors: Anchors, tile: Tile) -> dict[str, Arra
         state = surveyor.state(anchors.meshes[number], anchors.xs[number], grid.values(i, j).reshape(2))
         if sweep.begin(at, state):
             sweep.spread(at)
-    return surveyor.survey(sweep, anchors.outcomes[tiles[tile]])
+    return sweep
+
+
+def find_state(store: DiagramStore, diagram: Diagram, number: int, at: Index) -> Stationary | None:
+    """A state of the diagram at a grid point, computed again from the anchor of its tile; None where there is none."""
+    grid = store.request.grid
+    surveyor = Surveyor(store.scenario, grid.keys, stability=False)
+    tile, anchors = grid.tile_of(at), store.read(number)
+    place = grid.tiles.index(tile)
+    middle = int(grid.x.anchors[tile[0]]), int(grid.y.anchors[tile[1]])
+    if anchors.outcomes[place] is Outcome.CONVERGED:
+        # Mostly a few points on the way are enough.
+        low, high = np.minimum(at, middle), np.maximum(at, middle) + 1
+        sweep = Sweep(grid.values(*(slice(a, b) for a, b in zip(low, high, strict=True))))
+        start = middle[0] - int(low[0]), middle[1] - int(low[1])
+        state = surveyor.state(anchors.meshes[place], anchors.xs[place], grid.values(*middle).reshape(2))
+        if sweep.begin(start, state):
+            sweep.spread(start)
+        found = sweep.found.get((at[0] - int(low[0]), at[1] - int(low[1])))
+        if found is not None and surveyor.is_stored(found, diagram, number, at):
+            return found
+    x, y = grid.span(tile)
+    found = _sweep(store, surveyor, anchors, tile).found.get((at[0] - x.start, at[1] - y.start))
+    return found if found is not None and surveyor.is_stored(found, diagram, number, at) else None
 
 
 def _around(tile: Tile) -> Iterator[Tile]:
@@ -101,36 +144,54 @@ class Surveyor:
         out: dict[str, Array] = {name: np.full(shape, np.nan) for name in names}
         untried = fallback if fallback is not Outcome.CONVERGED else Outcome.NOT_REACHED
         near: Spectrum | None = None
-        out[OUTCOME] = np.zeros(shape, np.int8)
+        out[OUTCOME], out[REGIME] = np.zeros(shape, np.int8), np.zeros(shape, np.uint8)
         for at in np.ndindex(*shape):
             state = sweep.found.get(at)
             if state is None:
                 out[OUTCOME][at] = CODES[sweep.reasons.get(at, untried)]
                 continue
-            values, end = self.observed(state)
+            assert isinstance(state.problem, KeyedProblem)
+            base, measured, count = state.problem.base, self._measured(state), None
+            end = shape_end(base, state.x)
             out[OUTCOME][at] = CODES[end or Outcome.CONVERGED]
-            values |= {"correction": state.correction, "iterations": state.iterations}
+            about = {"correction": state.correction, "iterations": state.iterations, "elements": base.elements}
+            values = self._in_units(state, measured) | about
             if self.stability:
-                assert isinstance(state.problem, KeyedProblem)
                 near = spectrum_at(state.problem, state.x, state.p, near=near)
-                values[UNSTABLE] = np.nan if near.n_unstable is None else near.n_unstable
+                count = near.n_unstable
+                values[UNSTABLE] = np.nan if count is None else count
+            if end is None:
+                has_image = state.problem.reflected(state.x) is not None
+                mirrors = is_symmetric(state.problem, state.x) if has_image else None
+                out[REGIME][at] = regime_of(mirrors, measured, count)
             for name, value in values.items():
                 out[name][at] = value
         return out
 
-    def observed(self, state: Stationary) -> tuple[dict[str, float], Outcome | None]:
-        """Observables in the scenario's units, and why the state is no physical shape, if so."""
+    def is_stored(self, state: Stationary, diagram: Diagram, number: int, at: Index) -> bool:
+        """Whether a state is that of a diagram."""
+        x, y = self.keys
+        there = diagram.dataset.isel(
+            {x: at[0], y: at[1], **({"state": number} if "state" in diagram.dataset.dims else {})}
+        )
+        mine = self._in_units(state, self._measured(state))
+        return all(abs(mine[name] - float(there[name])) <= TELLING * abs(mine[name]) for name in ("area", "length"))
+
+    def _measured(self, state: Stationary) -> dict[str, float]:
+        """Dimensionless observables."""
         assert isinstance(state.problem, KeyedProblem)
         problem = state.problem.base
         p = state.problem.powers.value(state.p)
         values = self._engine.values | dict(zip(self._engine.system.parameters, p.tolist(), strict=True))
         engine = replace(self._engine, problem=problem, p=p, values=values)
-        measured = measure(engine, state.x, Rate.of_growth(problem.stored(state.x, p)))
+        return measure(engine, state.x, Rate.of_growth(problem.stored(state.x, p)))
+
+    def _in_units(self, state: Stationary, measured: dict[str, float]) -> dict[str, float]:
+        """In the scenario's units."""
         units = self._units
         if self._is_scaled:
             units = self._unit(self.scenario.with_overrides(dict(zip(self.keys, state.p.tolist(), strict=True))))
-        out = {name: measured[name] * units[name] for name in self.names if name in measured}
-        return out | {"elements": problem.elements}, shape_end(problem, state.x)
+        return {name: measured[name] * units[name] for name in self.names if name in measured}
 
     def _unit(self, scenario: Scenario) -> dict[str, float]:
         return {name: scenario.scales.factor(name) for name in self.names}

@@ -1,12 +1,10 @@
 """The figure of a curve: the plane of its two keys, with cusps and other special points marked and named."""
 
-from collections.abc import Sequence
-
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from shapespace.study.curve_store import Curve, CurvePoint, outline
+from shapespace.study.curve_store import Curve, outline
 from shapespace.view import style
 from shapespace.view.branch import quantity_label
 from shapespace.view.labels import label_points
@@ -21,6 +19,7 @@ MARKS = {
     "turn": "s",
     "user": "|",
     "end": "",
+    "reached-stop": "",
 }
 """By kind; physical ends and stalls are crosses."""
 HEIGHT_MM = 110.0
@@ -32,9 +31,7 @@ def plot_curve(curve: Curve) -> Figure:
         figure = Figure(figsize=(style.WIDTH_MM * 0.75 * style.MM, HEIGHT_MM * style.MM), layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        x, y = outline(curve.points)
-        axes.plot(x, y, color=COLOURS.get(curve.of, style.GREEN), label=f"{curve.of}s")
-        _mark(axes, curve.special_points)
+        draw_curve(axes, curve, curve.keys)
         axes.margins(0.06, 0.08)
         axes.set_xlabel(quantity_label(curve.scenario, curve.keys[0]))
         axes.set_ylabel(quantity_label(curve.scenario, curve.keys[1]))
@@ -43,7 +40,11 @@ def plot_curve(curve: Curve) -> Figure:
     return figure
 
 
-def _mark(axes: Axes, points: Sequence[CurvePoint]) -> None:
-    for point in points:
-        x, y = point.parameters
+def draw_curve(axes: Axes, curve: Curve, keys: tuple[str, str], named: bool = True) -> None:
+    """The curve with its special points, the first of these keys to the right; named: for a legend."""
+    order = [curve.keys.index(key) for key in keys]
+    colour = COLOURS.get(curve.of, style.GREEN)
+    axes.plot(*outline(curve.points)[order], color=colour, label=f"{curve.of}s" if named else None)
+    for point in curve.special_points:
+        x, y = point.parameters[order]
         axes.plot(x, y, MARKS.get(point.kind, "X"), color=style.RED, markersize=4.0, zorder=3)

@@ -1,19 +1,23 @@
-"""The figure of a diagram: an observable, or the number of growing modes, as colours over the plane of the two keys."""
+"""The figure of a diagram: an observable, the number of growing modes or regimes as colours over the plane of the two keys."""
+
+from itertools import cycle, islice
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.colors import BoundaryNorm, CenteredNorm, Normalize
+from matplotlib.colors import BoundaryNorm, CenteredNorm, Colormap, ListedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
-from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, NOT_COMPUTED, OUTCOME, UNSTABLE, Diagram
+from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, NOT_COMPUTED, OUTCOME, REGIME, UNSTABLE, Diagram
+from shapespace.study.regimes import describe, telling_aspects
 from shapespace.study.telling import most_telling
 from shapespace.view import style
 from shapespace.view.branch import quantity_label
+from shapespace.view.curve import draw_curve
 
 HEIGHT_MM = 90.0
 HATCH = "////"
@@ -24,8 +28,11 @@ MOST_COUNTED = 8
 def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
     """One map for each state, side by side in one scale; hatched where there is none, white where nothing is computed yet.
 
-    The observable is the most telling one that applies where none is given.
+    The observable is the most telling one that applies where none is given; `regime` is one map of all states together.
+    Boundaries are drawn over it where they were followed.
     """
+    if observable == REGIME:
+        return plot_regimes(diagram)
     data, (x, y) = diagram.dataset, diagram.request.grid.keys
     names = [str(name) for name in data.data_vars if name not in (OUTCOME, *ABOUT_SOLUTION)]
     is_state = data[OUTCOME] == CODES[Outcome.CONVERGED]
@@ -44,6 +51,7 @@ def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
         for axes, one, codes, state in zip(panels, maps, outcomes, diagram.request.states, strict=True):
             image = axes.pcolormesh(data[x], data[y], one, norm=norm, cmap=colours, rasterized=True)
             _mark_missing(axes, data[x].to_numpy(), data[y].to_numpy(), codes)
+            draw_boundaries(axes, diagram)
             axes.set_xlabel(quantity_label(diagram.scenario, x))
             if len(maps) > 1:
                 axes.set_title(state)
@@ -55,6 +63,49 @@ def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
             bar.set_ticklabels([str(count) for count in range(len(norm.boundaries) - 1)])
         bar.outline.set_visible(False)
     return figure
+
+
+def plot_regimes(diagram: Diagram) -> Figure:
+    """What the states at each point are like, all of them together, in the aspects that differ somewhere."""
+    codes, (x, y) = diagram.regimes, diagram.request.grid.keys
+    with style.house_style():
+        figure = Figure(figsize=(0.7 * style.WIDTH_MM * style.MM, 1.2 * HEIGHT_MM * style.MM), layout="constrained")
+        FigureCanvasAgg(figure)
+        axes = figure.add_subplot()
+        draw_regimes(axes, diagram, codes)
+        draw_boundaries(axes, diagram)
+        axes.set_xlabel(quantity_label(diagram.scenario, x))
+        axes.set_ylabel(quantity_label(diagram.scenario, y))
+        figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center")
+    return figure
+
+
+def draw_regimes(axes: Axes, diagram: Diagram, codes: np.ndarray) -> None:
+    """Regimes (n_y, n_x) as colours, each named in the legend's handles."""
+    x, y = diagram.request.grid.keys
+    aspects = telling_aspects(sorted({*codes.ravel().tolist()} - {0}))
+    reduced = codes & int(aspects)
+    present = sorted({*reduced.ravel().tolist()})
+    numbers = np.searchsorted(present, reduced)
+    chosen = ["white"] * (0 in present) + [*islice(cycle(style.REGIMES), len(present) - (0 in present))]
+    colours: Colormap = ListedColormap(chosen)
+    norm = BoundaryNorm(np.arange(len(present) + 1) - 0.5, colours.N)
+    data = diagram.dataset
+    axes.pcolormesh(data[x], data[y], numbers, norm=norm, cmap=colours, rasterized=True)
+    for number, code in enumerate(present):
+        axes.fill([], [], facecolor=chosen[number], edgecolor=style.FAINT, lw=0.4, label=describe(code))
+
+
+def draw_boundaries(axes: Axes, diagram: Diagram) -> None:
+    """The curves that bound regions, within the range of the map."""
+    keys = diagram.request.grid.keys
+    limits = axes.get_xlim(), axes.get_ylim()
+    seen: set[str] = set()
+    for curve in diagram.boundaries:
+        draw_curve(axes, curve, keys, named=curve.of not in seen)
+        seen.add(curve.of)
+    if diagram.boundaries:
+        axes.set(xlim=limits[0], ylim=limits[1])
 
 
 def _telling(diagram: Diagram, states: xr.Dataset) -> str:
