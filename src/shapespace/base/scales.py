@@ -13,6 +13,7 @@ so two statements of one experiment in different units are the same computation,
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -205,6 +206,7 @@ class Scales:
             length_symbol=symbol,
         )
 
+    @cache  # noqa: B019 (scales are few)
     def factor(self, name: str) -> float:
         """The unit of a quantity: its value in the user's units is this times its dimensionless value."""
         dimension = QUANTITIES[name].dimension

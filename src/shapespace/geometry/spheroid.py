@@ -5,18 +5,22 @@ harmonic l = 2, the leaning l = 3 and a shift.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from scipy.optimize import brentq
 
 from shapespace.base.arrays import Array
 
 ORDER = 400
 """Of the quadrature and of the arc length's interpolation: round-off down to elongations of some hundred."""
 LARGEST_ELONGATION = 1e3
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(ORDER)
+
+
+@cache
+def _quadrature() -> tuple[Array, Array]:
+    """Gauss points and weights on [-1, 1], made when they are needed."""
+    return np.polynomial.legendre.leggauss(ORDER)
 
 
 @dataclass(frozen=True)
@@ -30,6 +34,9 @@ class Spheroid:
     @classmethod
     def of(cls, area: float, volume: float, oblate: bool = False, leaning: float = 0.0) -> "Spheroid":
         """The one with this area and volume, long or flat. ValueError where there is none."""
+        # Imported late: it takes half a second, and most surfaces are none.
+        from scipy.optimize import brentq
+
         reduced = 6.0 * np.sqrt(np.pi) * volume / area**1.5
 
         def excess(logarithm: float) -> float:
@@ -70,8 +77,9 @@ class Spheroid:
     @property
     def area(self) -> float:
         """2 pi int r ds."""
-        t = 0.5 * np.pi * (_POINTS + 1.0)
-        return float(np.pi**2 * (_WEIGHTS @ (self.outline(t)[0] * self.speed(t))))
+        points, weights = _quadrature()
+        t = 0.5 * np.pi * (points + 1.0)
+        return float(np.pi**2 * (weights @ (self.outline(t)[0] * self.speed(t))))
 
     @property
     def volume(self) -> float:

@@ -28,20 +28,41 @@ class GaussRule:
 
     def basis(self, x: Array) -> Array:
         """Values at x (m,) of the k Lagrange polynomials through the Gauss points; shape (m, k)."""
-        x = np.atleast_1d(x)[:, None, None]
-        difference = self.points[:, None] - self.points[None, :] + np.eye(self.degree)
-        factors = np.where(np.eye(self.degree, dtype=bool), 1.0, (x - self.points) / difference)
-        return np.asarray(factors.prod(axis=2))
+        return np.asarray(_legendre(2.0 * np.atleast_1d(x) - 1.0, self.degree - 1) @ _series(self.degree))
 
     def basis_integral(self, x: Array) -> Array:
-        """Integrals from 0 to x (m,) of the Lagrange polynomials, exact by the same Gauss rule; shape (m, k)."""
-        x = np.atleast_1d(np.asarray(x, dtype=float))
-        inner = self.basis((x[:, None] * self.points).ravel()).reshape(len(x), self.degree, self.degree)
-        return np.asarray(x[:, None] * np.einsum("q,mql->ml", self.weights, inner))
+        """Integrals from 0 to x (m,) of the Lagrange polynomials; shape (m, k)."""
+        return np.asarray(_legendre(2.0 * np.atleast_1d(x) - 1.0, self.degree) @ _integral_series(self.degree))
 
     def interpolation_constant(self) -> float:
         """max over x of |prod_l (x - x_l) integrated|: the factor of w^(k+1) y^(k+1) in the interpolation error."""
         return _interpolation_constant(self.degree)
+
+
+def _legendre(x: Array, degree: int) -> Array:
+    """P_0 .. P_degree at x (m,), (m, degree + 1): for few points ten times as fast as numpy's legvander."""
+    values = np.ones((degree + 1, len(x)))
+    values[1] = x
+    for j in range(2, degree + 1):
+        values[j] = ((2 * j - 1) * x * values[j - 1] - (j - 1) * values[j - 2]) / j
+    return values.T
+
+
+@cache
+def _series(degree: int) -> Array:
+    """Legendre coefficients (k, k) of the Lagrange polynomials, one in a column, by their discrete orthogonality:
+
+    l_m(x) = sum_j (2 j + 1)/2 w_m P_j(x_m) P_j(x) on [-1, 1].
+    """
+    nodes, weights = legendre.leggauss(degree)
+    norms = np.arange(degree) + 0.5
+    return np.asarray(norms[:, None] * (_legendre(nodes, degree - 1) * weights[:, None]).T)
+
+
+@cache
+def _integral_series(degree: int) -> Array:
+    """Legendre coefficients (k + 1, k) of their integrals over [0, x], half those over [-1, 2 x - 1]."""
+    return np.asarray(legendre.legint(_series(degree), lbnd=-1.0, scl=0.5, axis=0))
 
 
 @cache
@@ -58,5 +79,6 @@ def gauss_rule(degree: int) -> GaussRule:
     if not 2 <= degree <= 8:
         raise ValueError(f"degree must lie in 2..8; got {degree}.")
     nodes, weights = legendre.leggauss(degree)
-    rule = GaussRule(degree, 0.5 * (nodes + 1.0), 0.5 * weights, np.zeros((degree, degree)))
-    return GaussRule(degree, rule.points, rule.weights, rule.basis_integral(rule.points))
+    points = 0.5 * (nodes + 1.0)
+    matrix = _legendre(nodes, degree) @ _integral_series(degree)
+    return GaussRule(degree, points, 0.5 * weights, np.asarray(matrix))

@@ -6,12 +6,13 @@ the compiler. Tiles come as flat vectors (layout.py). A point's row is v = (slop
 
 from collections.abc import Callable
 from functools import cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from shapespace.base.arrays import Traced
+from shapespace.numerics.kept import Kept
 from shapespace.numerics.system import AbstractSystem
 
 Density = Callable[..., dict[str, Traced]]
@@ -193,14 +194,37 @@ class Functions(NamedTuple):
     densities: Callable[..., dict[str, Traced]]
 
 
+_NAMES: dict[AbstractSystem, str] = {}
+
+
+def name_system(system: AbstractSystem, name: str) -> None:
+    """Keep the compiled functions of a system on disk, under a name that the package gives to no other.
+
+    Only for systems that the package's own sources define: a user's law may change while its name does not.
+    """
+    _NAMES[system] = name
+
+
 @cache
 def compiled_functions(system: AbstractSystem) -> Functions:
     """Compiled functions of arrays only: looking up a system at each call would cost more than small evaluations."""
+    name = _NAMES.get(system)
+
+    def compiled(function: Callable[..., Any]) -> Callable[..., Any]:
+        of_arrays = partial(function, system)
+        return jax.jit(of_arrays) if name is None else Kept(of_arrays, f"{name} {function.__name__}")
+
+    @cache
+    def densities(density: Density) -> Callable[..., Any]:
+        of_arrays = partial(_densities, system, density)
+        is_own = name is not None and density.__module__.startswith(f"{__package__.partition('.')[0]}.")
+        return Kept(of_arrays, f"{name} {density.__module__} {density.__qualname__}") if is_own else jax.jit(of_arrays)
+
     return Functions(
-        values=jax.jit(partial(_values, system)),
-        linearised=jax.jit(partial(_linearised, system)),
-        stored=jax.jit(partial(_stored, system)),
-        derivative=jax.jit(partial(_first_derivative, system)),
-        second_derivative=jax.jit(partial(_second_derivative, system)),
-        densities=jax.jit(partial(_densities, system), static_argnums=0),
+        values=compiled(_values),
+        linearised=compiled(_linearised),
+        stored=compiled(_stored),
+        derivative=compiled(_first_derivative),
+        second_derivative=compiled(_second_derivative),
+        densities=lambda density, tile: densities(density)(tile),
     )

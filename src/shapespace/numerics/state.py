@@ -1,6 +1,7 @@
 """A collocation solution as a value: mesh, coefficients, evaluation anywhere, transfer between meshes."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,7 @@ class State:
         """The Gauss rule of the elements."""
         return gauss_rule(self.slopes.shape[1])
 
-    @property
+    @cached_property
     def widths(self) -> Array:
         """Element widths (N,)."""
         return np.diff(self.mesh)
@@ -44,7 +45,7 @@ class State:
         return np.asarray(self.nodes[:-1, None] + self.widths[:, None, None] * increments)
 
     def _locate(self, u: Array) -> tuple[NDArray[np.intp], Array]:
-        element = np.clip(np.searchsorted(self.mesh, u, side="right") - 1, 0, len(self.mesh) - 2)
+        element = np.searchsorted(self.mesh[1:-1], u, side="right")
         return element, (u - self.mesh[element]) / self.widths[element]
 
     def place(self, u: float) -> tuple[int, float]:
@@ -57,6 +58,12 @@ class State:
         element, x = self._locate(u)
         weights = self.rule.basis_integral(x) * self.widths[element][:, None]
         return np.asarray(self.nodes[element] + np.einsum("ml,mln->mn", weights, self.slopes[element]))
+
+    def field(self, column: int, u: Array) -> Array:
+        """One differential field at u (m,), as `values` has it."""
+        element, x = self._locate(u)
+        weights = self.rule.basis_integral(x) * self.widths[element][:, None]
+        return np.asarray(self.nodes[element, column] + (weights * self.slopes[element, :, column]).sum(axis=1))
 
     def derivatives(self, u: Array) -> Array:
         """d/du of the differential fields at u (m,), shape (m, n); error of order k."""

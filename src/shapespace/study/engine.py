@@ -12,6 +12,7 @@ from shapespace.models.recipe import Recipe
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.mesh import uniform_mesh
+from shapespace.numerics.pointwise import name_system
 from shapespace.numerics.state import State, state_from_functions
 from shapespace.study.frame import Frame
 from shapespace.study.keys import MODELS
@@ -33,8 +34,12 @@ def recipe_of(model: str) -> Recipe:
 
 @cache
 def _system(recipe: Recipe, azimuthal: bool) -> SurfaceSystem:
-    """Made once: functions are compiled for each system anew."""
-    return recipe.system(azimuthal)
+    """Made once: functions are compiled for each system anew, but those of shipped models are kept."""
+    system = recipe.system(azimuthal)
+    for name, shipped in _RECIPES.items():
+        if recipe is shipped:
+            name_system(system, f"{name}, azimuthal: {azimuthal}")
+    return system
 
 
 BALL = 4.0 / 3.0 * np.pi

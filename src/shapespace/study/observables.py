@@ -23,8 +23,8 @@ SUPPLIES = ("force_power", "boundary_power", "chemical_power")
 FLOWS = ("dissipation", *DISSIPATIONS, "external_power", *SUPPLIES, "energy_rate", "energy_residual", "amount_supply")
 """What belongs to the motion of a surface, not to its shape: not known of a state that is given."""
 _SAMPLES_PER_ELEMENT = 4
-_ZOOMS = 5
-"""Each narrows the place of an extremum eightfold; its value then is exact to round-off."""
+_ZOOMS, _ZOOM = 3, 64
+"""Each narrows the place of an extremum to two of so many parts; its value then is exact to round-off."""
 
 
 def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
@@ -38,7 +38,7 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
     out = {
         "height": first[column["z"]] - last[column["z"]],
         "length": scalars["h"],
-        "equator_radius": float(state.values(np.array([0.5]))[0, column["r"]]),
+        "equator_radius": float(state.field(column["r"], np.array([0.5]))[0]),
         "max_meridional_curvature": peaks["curvature"],
         **{name: integrals[name] for name in ("area", "bending_energy", "energy")},
         **_powers(engine, integrals, first, last),
@@ -126,7 +126,7 @@ def neck_radius(state: State, r: int) -> float | None:
 def neck(state: State, r: int) -> tuple[float, float] | None:
     """Where r(u) has its smallest interior local minimum, and its value there; None without one."""
     u = _samples(state)
-    values = state.values(u)[:, r]
+    values = state.field(r, u)
     inner = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1
     found = [_largest_between(state, r, -1.0, u[i - 1], u[i + 1]) for i in inner]
     return min(((place, -value) for place, value in found), key=lambda one: one[1], default=None)
@@ -144,8 +144,7 @@ def shape_end(problem: CollocationProblem, x: Array) -> Outcome | None:
     z = fields.index("z")
 
     def outline(u: Array) -> tuple[Array, Array]:
-        values = state.values(u)
-        return values[:, r], values[:, z]
+        return state.field(r, u), state.field(z, u)
 
     radii, heights = outline(u)
     # An outline on its side of the axis cannot cross itself where it only falls, or turns only one way around a point.
@@ -159,7 +158,7 @@ def shape_end(problem: CollocationProblem, x: Array) -> Outcome | None:
 def largest_value(state: State, field: int) -> tuple[float, float]:
     """Where a field is largest, and its value there; a uniform field has its largest value in the middle."""
     u = _samples(state)
-    values = state.values(u)[:, field]
+    values = state.field(field, u)
     top = float(values.max())
     if top - float(values.min()) <= 1e-12 * max(abs(top), 1.0):
         return 0.5, top
@@ -172,8 +171,8 @@ def largest_value(state: State, field: int) -> tuple[float, float]:
 def _largest_between(state: State, field: int, sign: float, left: float, right: float) -> tuple[float, float]:
     """Where sign * field is largest between two points with one maximum between them, and that value, by zooming in."""
     for _ in range(_ZOOMS):
-        u = np.linspace(left, right, 17)
-        values = sign * state.values(u)[:, field]
+        u = np.linspace(left, right, _ZOOM + 1)
+        values = sign * state.field(field, u)
         i = int(values.argmax())
-        left, right = u[max(i - 1, 0)], u[min(i + 1, 16)]
+        left, right = u[max(i - 1, 0)], u[min(i + 1, _ZOOM)]
     return float(u[i]), float(values[i])
