@@ -21,7 +21,6 @@ import time
 
 import numpy as np
 from benchmarks.peer_auto import MISSING, STEPS, auto_directory, run_auto
-from tests.classic import at_rest, bratu, chan
 
 from shapespace.analysis.bifurcation import Kind, SingularPoint
 from shapespace.analysis.branch import Point
@@ -36,6 +35,7 @@ from shapespace.base.problem import AbstractSmoothProblem
 from shapespace.study.engine import Engine
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.scenario import scenario
+from shapespace.study.verification.classic import at_rest, bratu, chan
 
 KEY, END = "ring_amplitude", 4.2
 MESH_TOLERANCE = 1e-4
@@ -43,7 +43,7 @@ MESH_TOLERANCE = 1e-4
 CHAN_CUSP = (4.1909181064, 0.0282060679)
 """(a, b); references/continuation.md, row 5."""
 BRATU_FOLD = 3.513830719125161
-"""Exact; tests/classic.py."""
+"""Exact; study/verification/classic.py."""
 
 Made = TypeVar("Made")
 
