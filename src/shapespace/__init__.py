@@ -35,7 +35,9 @@ if TYPE_CHECKING:
     from shapespace.study.searching import search_states as search_states
     from shapespace.study.steady import Steady as Steady
     from shapespace.study.steady import steady as steady
+    from shapespace.study.tables import stored_dataset as stored_dataset
     from shapespace.study.verification.table import verify as verify
+    from shapespace.view.export import export as export
     from shapespace.view.show import movie as movie
     from shapespace.view.show import plot as plot
 
@@ -67,6 +69,8 @@ _HOMES = {
     "Steady": "study.steady",
     "steady": "study.steady",
     "verify": "study.verification.table",
+    "export": "view.export",
+    "stored_dataset": "study.tables",
     "movie": "view.show",
     "plot": "view.show",
 }

@@ -125,20 +125,48 @@ def movie(
     print(written)
 
 
-@app.command(help_epilogue=examples("shapespace export results/guided-division division.nc"))
+@app.command(
+    help_epilogue=examples(
+        "shapespace export results/guided-division division.nc",
+        "shapespace export results/guided-division --vtk",
+        "shapespace export results/division --csv",
+        "shapespace export results/division:fold-1 --ply",
+    )
+)
 def export(
-    store: Store,
-    file: Annotated[Path, Parameter(name="FILE", help="NetCDF file, ending in .nc.")],
+    store: StoreOrLabel,
+    file: Annotated[
+        Path | None,
+        Parameter(name="FILE", help="File, or folder of meshes; the default is named as the store and lies beside it."),
+    ] = None,
     /,
+    *,
+    netcdf: Annotated[bool, Parameter(help="All of it as one self-describing file; also by the ending .nc.")] = False,
+    csv: Annotated[
+        bool, Parameter(help="Numbers over times, states or points of a grid; also by the ending .csv.")
+    ] = False,
+    vtk: Annotated[bool, Parameter(help="Meshes with fields, and series.pvd, for ParaView.")] = False,
+    ply: Annotated[bool, Parameter(help="A mesh for each time or state, with fields and colours.")] = False,
 ) -> None:
-    """Write a stored run as one self-describing NetCDF file, readable by xarray, Python, Julia, MATLAB."""
-    from shapespace.study.dataset import open_dataset
-    from shapespace.study.files import storage, write_atomically
+    """Write a run, a branch, a curve, a diagram or one state of them in a form that other programs read."""
+    from rich.console import Console
+    from rich.progress import Progress
 
-    if file.suffix != ".nc":
-        raise InputError(f"{file}: is not named as a NetCDF file; end it in .nc.")
-    # Made in memory: HDF5 crashes the process at its end when a disk is full under an open file.
-    data = open_dataset(store).to_netcdf(engine="h5netcdf")
-    with storage(file):
-        write_atomically(file, bytes(data))
-    print(file)
+    from shapespace.view.export import ENDINGS
+    from shapespace.view.export import export as write
+
+    asked = [
+        form for form, wanted in zip(("netcdf", "csv", "vtk", "ply"), (netcdf, csv, vtk, ply), strict=True) if wanted
+    ]
+    if not asked and file is not None:
+        asked = [form for form, ending in ENDINGS.items() if file.suffix == ending]
+    if len(asked) != 1:
+        what = f"{file}: does not tell the form by its ending; end it in .nc or .csv, or give" if file else "give"
+        raise InputError(f"{what if not asked else 'give only'} one of --netcdf, --csv, --vtk, --ply.")
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("writing meshes", total=None)
+        written = write(
+            store, file, form=asked[0], progress=lambda done, total: bar.update(task, completed=done, total=total)
+        )
+    print(written)

@@ -1,0 +1,157 @@
+"""Exports read back: meshes with their fields against closed forms of a sphere, series, tables and NetCDF against the dataset."""
+
+import struct
+import zlib
+from base64 import b64decode
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import numpy as np
+import pandas as pd
+import pytest
+import xarray as xr
+from tests.shell import Shell, one_complaint
+
+import shapespace as ss
+from shapespace.view.mesh import AROUND, Mesh, ply_bytes, revolved, vtk_bytes
+
+RADIUS = 1.3
+
+
+def sphere(is_closed: bool = True) -> Mesh:
+    """A sphere of radius 1.3, or its upper half, that swims upwards without changing its shape, with c = z."""
+    u = np.linspace(0.0, 1.0 if is_closed else 0.5, 201)
+    sin, cos = np.sin(np.pi * u), np.cos(np.pi * u)
+    radius = RADIUS * sin
+    radius[[0, -1] if is_closed else [0]] = 0.0
+    fields = {
+        "mesh_coordinate": u,
+        "radius": radius,
+        "axial_position": RADIUS * cos,
+        "tangent_angle": np.pi * u,
+        "tangential_velocity": -sin,
+        "normal_velocity": cos,
+        "concentration": RADIUS * cos,
+    }
+    return revolved(fields, is_closed)
+
+
+def area_and_volume(mesh: Mesh) -> tuple[float, float]:
+    """Of the triangles; the volume is that between them and the origin, positive where they are seen from outside."""
+    a, b, c = (mesh.points[mesh.triangles[:, i]] for i in range(3))
+    across = np.cross(b - a, c - a)
+    return float(0.5 * np.linalg.norm(across, axis=1).sum()), float(np.sum(a * across) / 6.0)
+
+
+def test_a_sphere_is_a_closed_mesh():
+    """Area, volume, outward orientation, Euler's number 2, the normal, and uniform velocity along the axis."""
+    mesh = sphere()
+    area, volume = area_and_volume(mesh)
+    assert area == pytest.approx(4.0 * np.pi * RADIUS**2, rel=2e-3)
+    assert volume == pytest.approx(4.0 / 3.0 * np.pi * RADIUS**3, rel=4e-3)
+    edges = {
+        tuple(sorted(pair)) for t in mesh.triangles.tolist() for pair in ((t[0], t[1]), (t[1], t[2]), (t[2], t[0]))
+    }
+    assert len(mesh.points) - len(edges) + len(mesh.triangles) == 2
+    np.testing.assert_allclose(mesh.data["normal"], mesh.points / RADIUS, atol=1e-12)
+    np.testing.assert_allclose(mesh.data["velocity"], np.tile([0.0, 0.0, 1.0], (len(mesh.points), 1)), atol=1e-12)
+    np.testing.assert_allclose(mesh.data["concentration"], mesh.points[:, 2], atol=1e-12)
+
+
+def test_an_open_surface_has_a_rim():
+    mesh = sphere(is_closed=False)
+    area, _ = area_and_volume(mesh)
+    assert area == pytest.approx(2.0 * np.pi * RADIUS**2, rel=2e-3)
+    assert (np.abs(mesh.points[-AROUND:, 2]) < 1e-12).all()
+
+
+def test_vtk_holds_what_the_mesh_has():
+    """Decoded by hand: blocks of zlib in base64."""
+    mesh = sphere()
+    root = ET.fromstring(vtk_bytes(mesh, {"concentration": "c0"}, 2.5))
+    arrays = {}
+    for element in root.iter("DataArray"):
+        text = (element.text or "").strip()
+        _, length, _, packed = struct.unpack("<4Q", b64decode(text[:44]))
+        raw = zlib.decompress(b64decode(text[44:]))
+        assert (len(raw), len(b64decode(text[44:]))) == (length, packed)
+        kind = {"Float32": "<f4", "Float64": "<f8", "Int64": "<i8"}[element.attrib["type"]]
+        arrays[element.attrib["Name"]] = np.frombuffer(raw, kind)
+    np.testing.assert_allclose(arrays["points"].reshape(-1, 3), mesh.points, atol=1e-6)
+    np.testing.assert_allclose(arrays["velocity"].reshape(-1, 3), mesh.data["velocity"], atol=1e-6)
+    np.testing.assert_array_equal(arrays["connectivity"].reshape(-1, 3), mesh.triangles)
+    assert arrays["offsets"][-1] == mesh.triangles.size
+    assert arrays["TimeValue"].tolist() == [2.5]
+
+
+def test_pyvista_reads_both(tmp_path: Path):
+    pyvista = pytest.importorskip("pyvista", reason="reading meshes needs the extra shapespace[export]")
+    mesh = sphere()
+    (tmp_path / "a.vtp").write_bytes(vtk_bytes(mesh, {}, 2.5))
+    (tmp_path / "a.ply").write_bytes(ply_bytes(mesh, "closed-surface", (-RADIUS, RADIUS)))
+    for name in ("a.vtp", "a.ply"):
+        read = pyvista.read(tmp_path / name)
+        np.testing.assert_allclose(read.points, mesh.points, atol=1e-6)
+        assert read.n_cells == len(mesh.triangles)
+        assert read.area == pytest.approx(4.0 * np.pi * RADIUS**2, rel=2e-3)
+        assert read.is_manifold
+    read = pyvista.read(tmp_path / "a.vtp")
+    np.testing.assert_allclose(read["concentration"], mesh.data["concentration"], atol=1e-6)
+    np.testing.assert_allclose(read["velocity"], mesh.data["velocity"], atol=1e-6)
+    assert read.field_data["TimeValue"][0] == 2.5
+
+
+@pytest.fixture(scope="module")
+def stores(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short run and a short branch with a pitchfork."""
+    folder = tmp_path_factory.mktemp("stores")
+    ss.run(ss.scenario("polar-swimmer", until=2e-3, elements=20), out=folder / "run")
+    case = ss.scenario("polar-swimmer", elements=20)
+    ss.branch(case, "peclet", 23.0, start=21.0, state="trivial", out=folder / "branch")
+    return folder
+
+
+def test_a_run_is_read_back(stores: Path, tmp_path: Path):
+    data = ss.open_dataset(stores / "run")
+    ss.export(stores / "run", tmp_path / "run.nc")
+    xr.testing.assert_identical(xr.load_dataset(tmp_path / "run.nc"), data)
+    ss.export(stores / "run", tmp_path / "run.csv", form="csv")
+    table = pd.read_csv(tmp_path / "run.csv", comment="#")
+    np.testing.assert_array_equal(table["time"], data["time"])
+    np.testing.assert_array_equal(table["pressure"], data["pressure"])
+    series = ss.export(stores / "run", tmp_path / "meshes", form="vtk")
+    entries = [*ET.fromstring(series.read_bytes()).iter("DataSet")]
+    np.testing.assert_array_equal([float(one.attrib["timestep"]) for one in entries], data["time"])
+    assert all((series.parent / one.attrib["file"]).is_file() for one in entries)
+    folder = ss.export(stores / "run", tmp_path / "ply", form="ply")
+    assert len([*folder.glob("*.ply")]) == data.sizes["time"]
+
+
+def test_a_branch_is_read_back(stores: Path, tmp_path: Path):
+    """States with their shapes, the parameter, rates and labels, in the order of the branch."""
+    branch = ss.open_branch(stores / "branch")
+    ss.export(stores / "branch", tmp_path / "branch.nc")
+    data = xr.load_dataset(tmp_path / "branch.nc")
+    np.testing.assert_array_equal(data["peclet"], [point.parameter for point in branch.points])
+    assert data["label"].to_numpy().tolist() == [point.label for point in branch.points]
+    assert data["radius"].attrs["units"] == "R0"
+    first = branch.points[0]
+    np.testing.assert_allclose(data["growth_rate"][0][: len(first.growth_rates[:6])], first.growth_rates[:6, 0])
+    np.testing.assert_allclose(data["radius"].max("point"), 1.0, rtol=1e-4)
+    assert len(pd.read_csv(ss.export(stores / "branch", tmp_path / "b.csv", form="csv"), comment="#")) == len(
+        data["label"]
+    )
+    profile = pd.read_csv(ss.export(f"{stores / 'branch'}:pitchfork-1", tmp_path / "p.csv", form="csv"), comment="#")
+    np.testing.assert_allclose(np.hypot(profile["radius"], profile["axial_position"]), 1.0, rtol=1e-6)
+
+
+def test_the_command_chooses_the_form(
+    stores: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+):
+    monkeypatch.chdir(tmp_path)
+    shell = Shell(capsys)
+    assert shell("export", stores / "run", "a.csv").out == "a.csv\n"
+    assert shell("export", stores / "run", "here", "--vtk").out == "here/series.pvd\n"
+    assert "--vtk" in one_complaint(shell("export", stores / "run"))
+    assert "give only one" in one_complaint(shell("export", stores / "run", "--vtk", "--ply"))
+    assert "end it in .nc" in one_complaint(shell("export", stores / "run", "a.txt"))
