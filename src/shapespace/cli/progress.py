@@ -46,7 +46,8 @@ class ProgressDisplay:
 
     def update(self, text: str, share: float | None = None, is_notable: bool = False) -> None:
         """Where the work stands; a notable line stays on the screen."""
-        percent = "" if share is None else f"{100 * min(max(share, 0.0), 1.0):.0f} %"
+        # Adding zero takes the sign from a negative one.
+        percent = "" if share is None else f"{100 * min(max(share, 0.0), 1.0) + 0.0:.0f} %"
         if self._bar is None:
             if is_notable or monotonic() - self._told >= self._pause:
                 self._told = monotonic()

@@ -14,9 +14,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
-from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
+from shapespace.numerics.matching import cheapest_matching
 from shapespace.numerics.small_lu import Array, BoolArray, IntArray, backward, compiled, copy, forward, lu_rectangular
 
 GROWTH_LIMIT = 1e4
@@ -100,9 +99,8 @@ def _matched(decades: bytes, m: int, n: int, columns: int, k: int) -> Plan:
     entries = np.frombuffer(decades, dtype=np.int8).reshape(m, columns)
     own = entries[:, :m].copy()
     own[:, :n] = np.maximum(own[:, :n], entries[:, m : m + n])
-    # Weights must not vanish; an absent entry is the last resort, so that a singular pattern has a plan as well.
-    cost = np.where(own == ABSENT, 1e3, 2e2 - own.astype(float))
-    _, partner = min_weight_full_bipartite_matching(csr_array(cost))
+    # An absent entry is the last resort, so that a singular pattern has a plan as well.
+    partner = cheapest_matching(np.where(own == ABSENT, 1e3, -own.astype(float)))
     return _plan((entries != ABSENT).tobytes(), tuple(partner.tolist()), n, k)
 
 
