@@ -39,7 +39,7 @@ ALLOWED: dict[str, frozenset[str]] = {
     "analysis": frozenset({"base", "numerics"}),
     "study": frozenset({*MECHANICS, "analysis"}),
     "view": frozenset({"base", "study"}),
-    "cli": frozenset({"base", "study", "view"}),
+    "cli": frozenset({"base", "study", "view", "app"}),
     "app": frozenset({"base", "study", "view"}),
     # The front doors: public names re-exported, those for models of one's own, and `python -m shapespace`.
     "__init__": frozenset({*MECHANICS, "analysis", "study", "view"}),

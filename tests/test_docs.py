@@ -125,6 +125,7 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
         "plot",
         "movie",
         "export",
+        "explore",
         "check",
         "verify",
     }

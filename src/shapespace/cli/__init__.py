@@ -20,6 +20,7 @@ from shapespace.cli import curves as curves  # isort: skip
 from shapespace.cli import searches as searches  # isort: skip
 from shapespace.cli import diagrams as diagrams  # isort: skip
 from shapespace.cli import pictures as pictures  # isort: skip
+from shapespace.cli import explorer as explorer  # isort: skip
 from shapespace.cli import checking as checking  # isort: skip
 from shapespace.cli import verifying as verifying  # isort: skip
 from shapespace.cli.shared import BAD_INPUT, INTERRUPTED, app, tell

@@ -79,7 +79,7 @@ def find_start(text: str | Path) -> Start:
         place = _numbered(CurveStore, path, label) or (curve[label] if label else curve.points[-1])
         return Start(str(text), curve.scenario_at(place), place.frame, curve.keys[0], place.on_branch, curve.keys)
     run = RunStore.open(path)
-    if label and not label.isdigit():
+    if label and not label.isdecimal():
         raise InputError(
             f"--from {text}: a run has no labels; give the number of a frame, or leave :{label} away to start from the last one."
         )
@@ -90,7 +90,7 @@ def find_start(text: str | Path) -> Start:
 
 def _numbered(kind: type[AbstractRecordStore[R]], path: Path, label: str) -> R | None:
     """The record whose number the label is; None where it is no number."""
-    if not label.isdigit():
+    if not label.isdecimal():
         return None
     try:
         return kind.open(path).read(int(label))

@@ -314,3 +314,14 @@ def check_has_isolated_states(scenario: Scenario) -> None:
             "turnover_rate = 0: conserves the regulator, so that stationary states come in families that no equation tells "
             "apart; choose a turnover_rate > 0."
         )
+
+
+def modes_near(scenario: Scenario, frame: Frame, count: int = 6) -> Modes:
+    """Leading modes of a stored state at rest, settled anew. InputError where it does not rest at these parameters."""
+    found = steady_from(scenario, state_of(frame))
+    if not found.outcome.is_success:
+        raise InputError(f"this state does not rest at its parameters ({found.outcome}): {found.outcome.advice}")
+    spectrum = found.spectrum(count)
+    if not spectrum.outcome.is_success:
+        raise InputError(f"its growth rates are not known ({spectrum.outcome}): {spectrum.outcome.advice}")
+    return found.modes(spectrum)

@@ -1,0 +1,107 @@
+"""Show stores in a browser: served until interrupted, or written to one file."""
+
+import secrets
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from shapespace.app.catalogue import Catalogue
+from shapespace.app.page import question, single_file
+from shapespace.base.errors import InputError
+from shapespace.study.files import storage, write_atomically
+
+MOST_STATES = 4000
+"""Of all stores in one file: each state takes some kilobytes."""
+
+
+class Explorer:
+    """A served explorer: `address` to open, `serve` to answer until `stop`."""
+
+    def __init__(self, stores: Sequence[str | Path], port: int = 0) -> None:
+        # Imported late, as a file is written without them.
+        try:
+            import uvicorn
+
+            from shapespace.app.server import HOST, LONGEST_HEAD, make_app, open_socket
+        except ImportError as error:
+            raise InputError(
+                f"explore: needs {error.name}; install it with `pip install 'shapespace[explore]'`."
+            ) from None
+        self.catalogue = Catalogue([Path(one) for one in stores])
+        token = secrets.token_urlsafe(24)
+        self._socket = open_socket(port)
+        self.address = f"http://{HOST}:{self._socket.getsockname()[1]}/{token}/"
+        config = uvicorn.Config(
+            make_app(self.catalogue, token),
+            log_level="error",
+            access_log=False,
+            lifespan="off",
+            ws="none",
+            http="h11",
+            h11_max_incomplete_event_size=LONGEST_HEAD,
+            timeout_graceful_shutdown=1,
+            server_header=False,
+            proxy_headers=False,
+        )
+        self._server = uvicorn.Server(config)
+
+    def serve(self) -> None:
+        """Answer until interrupted or stopped."""
+        threading.Thread(target=self._prepare, daemon=True).start()
+        self._server.run(sockets=[self._socket])
+
+    def stop(self) -> None:
+        """End `serve` in another thread."""
+        self._server.should_exit = True
+
+    def close(self) -> None:
+        """Listen no longer, where `serve` was never called."""
+        self._socket.close()
+
+    def _prepare(self) -> None:
+        """Load what the first click needs while the browser still opens."""
+        for number in range(len(self.catalogue.paths)):
+            try:
+                source = self.catalogue.source(number)
+                source.state(next(source.places()))
+            except (InputError, StopIteration):
+                continue
+
+
+def export(stores: Sequence[str | Path], file: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
+    """Write the explorer of these stores as one HTML file that needs neither this program nor a network.
+
+    progress: told how many states are in of how many. InputError where the stores hold more than MOST_STATES states.
+    """
+    file = Path(file)
+    if file.suffix != ".html":
+        raise InputError(f"{file}: is not named as a page; end it in .html.")
+    catalogue = Catalogue([Path(one) for one in stores])
+    answers: dict[str, Any] = {question("stores"): catalogue.stores()}
+    asked = [*_questions(catalogue)]
+    count = sum(name == "state" for name, _ in asked)
+    if count > MOST_STATES:
+        raise InputError(f"{file}: {count} states are too many for one file, at most {MOST_STATES}; give fewer stores.")
+    done = 0
+    for name, about in asked:
+        answers[question(name, **about)] = catalogue.answer(name, {key: str(value) for key, value in about.items()})
+        if name == "state":
+            done += 1
+            if progress is not None:
+                progress(done, count)
+    with storage(file):
+        write_atomically(file, single_file(answers))
+    return file
+
+
+def _questions(catalogue: Catalogue) -> Iterator[tuple[str, dict[str, Any]]]:
+    """All that the page may ask about the stores without computing anything."""
+    for number in range(len(catalogue.paths)):
+        source = catalogue.source(number)
+        yield "overview", {"store": number}
+        for place in source.places():
+            yield "state", {"store": number, "place": place}
+            modes = source.modes(place)
+            for index in range(len(modes.modes)) if modes is not None else ():
+                yield "mode", {"store": number, "place": place, "index": index}

@@ -1,0 +1,182 @@
+"""Diagrams for the page: one map at a time, the numbers at a point, and its shape, which is computed again."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import zarr
+
+from shapespace.app.encoding import codes, exact, finite
+from shapespace.app.source import AbstractSource, described
+from shapespace.base.errors import InputError, StoreError
+from shapespace.base.outcome import Outcome
+from shapespace.base.scales import QUANTITIES
+from shapespace.study.curve_store import Curve, outline
+from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, OUTCOME, REGIME, UNSTABLE, Diagram, DiagramStore
+from shapespace.study.files import storage
+from shapespace.study.frame import Array, Frame
+from shapespace.study.modes import Modes
+from shapespace.study.scenario import Scenario
+from shapespace.study.telling import most_telling
+
+if TYPE_CHECKING:
+    from shapespace.study.diagram_state import DiagramStates
+
+IS_STATE = CODES[Outcome.CONVERGED]
+
+
+class DiagramSource(AbstractSource):
+    """A diagram. The place of a state is STATE,I,J: the number of the state, and those of the values along x and y."""
+
+    noun = "diagram"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        self._computes: tuple[tuple[int, ...], DiagramStates] | None = None
+
+    def store(self) -> DiagramStore:
+        return DiagramStore.open(self.path)
+
+    def content(self) -> dict[str, Any]:
+        store = self.store()
+        request, scenario = store.request, store.scenario
+        group = self._group()
+        names = [name for name in _arrays(group) if name not in (OUTCOME, REGIME, *ABOUT_SOLUTION)]
+        outcomes = self._values(group, OUTCOME)
+        found = outcomes == IS_STATE
+
+        def change(name: str) -> float:
+            values = self._values(group, name)[found] if name in names else np.zeros(1)
+            values = values[np.isfinite(values)]
+            return float(np.ptp(values)) if values.size else 0.0
+
+        return {
+            "map": {
+                "x": {"key": request.grid.x.key, "values": exact(request.grid.x.values)},
+                "y": {"key": request.grid.y.key, "values": exact(request.grid.y.values)},
+                "states": list(request.states),
+                "names": names,
+                "of": most_telling(scenario.kind, change),
+                "outcomes": codes(outcomes),
+                "boundaries": [_boundary(curve) for curve in Diagram(scenario, request, self.path).boundaries],
+                "meanings": {str(code): [str(outcome), outcome.advice] for outcome, code in CODES.items()},
+            }
+        }
+
+    def values(self, name: str) -> dict[str, Any]:
+        """One observable on all points (state, y, x), NaN where there is no state."""
+        group = self._group()
+        if name not in _arrays(group):
+            raise InputError(f"{name[:60]}: is no observable of this diagram.")
+        values = np.where(self._values(group, OUTCOME) == IS_STATE, self._values(group, name), np.nan)
+        return {"name": name, "values": exact(values)}
+
+    def state(self, place: str) -> dict[str, Any]:
+        number, i, j = self._place(place)
+        store, group = self.store(), self._group()
+        request = store.request
+        keys = request.grid.keys
+        x, y = request.grid.values(i, j).ravel().tolist()
+        there = {
+            name: float(group[name][(number, j, i) if group[name].ndim == 3 else (j, i)]) for name in _arrays(group)
+        }
+        code = int(there.pop(OUTCOME))
+        reason = next((outcome for outcome, known in CODES.items() if known == code), None)
+        unstable = there.pop(UNSTABLE, np.nan)
+        return {
+            "place": place,
+            "title": request.states[number],
+            "parameters": dict(zip(keys, (x, y), strict=True)),
+            "observables": finite(
+                {name: value for name, value in there.items() if name not in (REGIME, *ABOUT_SOLUTION)}
+            ),
+            "unstable": int(unstable) if np.isfinite(unstable) else None,
+            "missing": None if code == IS_STATE else [reason or "not-computed", reason.advice if reason else ""],
+        }
+
+    def places(self) -> Iterator[str]:
+        outcomes = self._values(self._group(), OUTCOME)
+        return (f"{s},{i},{j}" for s, j, i in np.argwhere(outcomes == IS_STATE))
+
+    def shape(self, place: str) -> dict[str, Any]:
+        """Everything about a state that must be computed again: its profiles, and how to go on from it."""
+        # Imported late, as below: most stores are opened without a solver.
+        from shapespace.study.dataset import profile_of
+
+        found = self._states().state(self._place(place))
+        at, frame = found.scenario, found.frame
+        number, i, j = self._place(place)
+        grid, name = self.store().request.grid, self.store().request.states[number]
+        tile = self._states().anchor((number, i, j))
+        return described(
+            at,
+            frame,
+            profile_of(at, frame),
+            f"{self.path.resolve()}:{name}-{tile}",
+            vary=grid.x.key,
+            stop=grid.x.stop,
+            exactly=True,
+            place=place,
+            title=name,
+            can_compute=True,
+        )
+
+    def modes(self, place: str) -> Modes | None:
+        return None
+
+    def resting(self, place: str) -> tuple[Scenario, Frame]:
+        found = self._states().state(self._place(place))
+        return found.scenario, found.frame
+
+    def _states(self) -> "DiagramStates":
+        """What computes shapes again; of what is stored now, where the diagram is still being computed."""
+        stamp = tuple(file.stat().st_mtime_ns for file in sorted((self.path / "anchors").iterdir()))
+        if self._computes is None or self._computes[0] != stamp or self.store().outcome is None:
+            from shapespace.study.diagram_state import DiagramStates
+
+            self._computes = (stamp, DiagramStates(self.path))
+        return self._computes[1]
+
+    def _place(self, text: str) -> tuple[int, int, int]:
+        store = self.store()
+        parts = text.split(",")
+        limits = (len(store.request.states), *store.request.grid.shape)
+        if len(parts) != 3 or not all(part.isdecimal() for part in parts):
+            raise InputError(f"{text[:20]!r}: is no point of this diagram; give STATE,I,J.")
+        state, i, j = map(int, parts)
+        if not (state < limits[0] and i < limits[1] and j < limits[2]):
+            raise InputError(f"{text[:40]}: is no point of this diagram, which has {' by '.join(map(str, limits))}.")
+        return state, i, j
+
+    def _group(self) -> Any:
+        with storage(self.path):
+            try:
+                return zarr.open_group(self.path, mode="r")
+            except (ValueError, KeyError, FileNotFoundError) as error:
+                raise StoreError(f"{self.path / 'zarr.json'}: is damaged or missing ({error}).") from None
+
+    def _values(self, group: Any, name: str) -> Array:
+        """An array (state, y, x)."""
+        values = np.asarray(group[name][...])
+        return values.reshape(-1, *values.shape[-2:])
+
+
+def _arrays(group: Any) -> list[str]:
+    """Names of what is stored at each point, observables in the order of the glossary."""
+    known = {name: place for place, name in enumerate(QUANTITIES)}
+    names = [name for name in group.array_keys() if group[name].ndim >= 2]
+    return sorted(names, key=lambda name: (known.get(name, len(known)), name))
+
+
+def _boundary(curve: Curve) -> dict[str, Any]:
+    """A curve in the plane of the map, with its named points; its keys come in the order of the map's axes."""
+    x, y = outline(curve.points)
+    named = [one for one in curve.special_points if one.kind not in ("end", "user")]
+    return {
+        "of": curve.of,
+        "keys": curve.keys,
+        "x": exact(x),
+        "y": exact(y),
+        "labels": [[one.label, *one.parameters.tolist()] for one in named],
+    }

@@ -1,0 +1,154 @@
+"""What the explorer shows of one store: an overview of all its states, one state at a time, and modes of a state."""
+
+from abc import ABC, abstractmethod
+from collections import OrderedDict
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from shapespace.app.commands import continuations, python_of
+from shapespace.app.encoding import drawn, finite, number
+from shapespace.base.arrays import Array
+from shapespace.base.errors import InputError
+from shapespace.base.scales import QUANTITIES
+from shapespace.study.frame import Frame
+from shapespace.study.modes import CRITICAL, Modes
+from shapespace.study.records import AbstractRecordStore
+from shapespace.study.scenario import Scenario
+
+KEPT = 32
+"""States whose computed modes are kept."""
+POINTS = 241
+"""Of a mode's profiles, as many as of a state's."""
+
+
+class AbstractSource(ABC):
+    """One store, read anew whenever it has changed. Everything returned is for JSON; places of states are text."""
+
+    noun: ClassVar[str]
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._computed: OrderedDict[str, Modes] = OrderedDict()
+
+    @abstractmethod
+    def store(self) -> AbstractRecordStore[Any]:
+        """The store, to read. StoreError where it is damaged."""
+
+    @abstractmethod
+    def content(self) -> dict[str, Any]:
+        """What is special to this kind of store in the overview: a `table` of states, or a `map`."""
+
+    @abstractmethod
+    def places(self) -> Iterator[str]:
+        """Places of all states."""
+
+    @abstractmethod
+    def state(self, place: str) -> dict[str, Any]:
+        """Everything about one state. InputError where there is none."""
+
+    @abstractmethod
+    def modes(self, place: str) -> Modes | None:
+        """Stored modes of a state; None where none are."""
+
+    @abstractmethod
+    def resting(self, place: str) -> tuple[Scenario, Frame]:
+        """A state at rest whose modes may be computed. InputError where it does not rest, or rests under a control."""
+
+    def overview(self) -> dict[str, Any]:
+        """What the store holds and how it came about."""
+        store = self.store()
+        at = store.scenario
+        return {
+            "noun": self.noun,
+            "name": self.path.resolve().name,
+            "path": str(self.path.resolve()),
+            "scenario": at.name,
+            "model": at.model,
+            "kind": at.kind,
+            "parameters": {key: value for key, value in at.values().items() if isinstance(value, float)},
+            "created": store.created,
+            "version": store.versions.get("shapespace", ""),
+            "outcome": store.outcome,
+            "advice": store.outcome.advice if store.outcome else f"The {self.noun} is not finished.",
+            "quantities": quantities(at),
+            **self.content(),
+        }
+
+    def spectrum(self, place: str) -> dict[str, Any]:
+        """Leading growth rates of a state, computed where they are not stored; that may take seconds."""
+        return rates_of(self._modes(place))
+
+    def mode(self, place: str, index: int) -> dict[str, Any]:
+        """The mode of a growth rate, by the number that it has in the state's own list."""
+        return mode_of(self._modes(place), index)
+
+    def _modes(self, place: str) -> Modes:
+        stored = self.modes(place)
+        if stored is not None:
+            return stored
+        if place not in self._computed:
+            # Imported late: solvers take seconds to load, and most states are only looked at.
+            from shapespace.study.steady import modes_near
+
+            self._computed[place] = modes_near(*self.resting(place))
+            if len(self._computed) > KEPT:
+                self._computed.popitem(last=False)
+        return self._computed[place]
+
+
+def quantities(at: Scenario) -> dict[str, list[str]]:
+    """Symbol, meaning and unit of every quantity by its name."""
+    return {
+        name: [quantity.symbol, quantity.meaning, at.scales.unit(name).replace("**", "^")]
+        for name, quantity in QUANTITIES.items()
+    }
+
+
+def described(
+    at: Scenario, frame: Frame, fields: Mapping[str, Array], start: str, *, vary: str | None = None, **more: Any
+) -> dict[str, Any]:
+    """A state for the page. fields: profiles along u (m,) by name; start: where the command line finds it."""
+    proposals = {name: more.pop(name) for name in ("stop", "kind", "exactly") if name in more}
+    exactly = bool(proposals.get("exactly"))
+    return {
+        "observables": finite(frame.observables),
+        "velocity": number(frame.observables.get("velocity", 0.0)),
+        "fields": {name: drawn(values) for name, values in fields.items() if np.isfinite(values).all()},
+        "start": start,
+        "python": python_of(at, start, exactly=exactly),
+        "commands": continuations(at, start, vary, **proposals),
+        **more,
+    }
+
+
+def rates_of(modes: Any) -> dict[str, Any]:
+    """Growth rates of modes, or of a stored point, with what is known of them."""
+    errors = modes.errors if isinstance(modes, Modes) else modes.growth_rate_errors
+    return {
+        "values": np.asarray(modes.growth_rates).reshape(-1, 2).tolist(),
+        "errors": [number(error) for error in errors.tolist()],
+        "parities": list(modes.parities),
+        "neutral": {str(i): name or CRITICAL for i, name in modes.neutral.items()},
+    }
+
+
+def mode_of(modes: Modes, index: int) -> dict[str, Any]:
+    """A mode's profiles, in units of the length and the concentration that its size 1 stands for."""
+    if not 0 <= index < len(modes.modes):
+        raise InputError(f"mode {index}: there is none; choose one of 0 to {len(modes.modes) - 1}.")
+    found = modes.profiles(index, POINTS)
+    unit = modes.scenario.scales.factor("length")
+    parts: dict[str, Array] = {"u": found.u}
+    for name, values in (("displacement", unit * found.displacement), ("tangential", found.tangential)):
+        parts |= {f"{name}_real": values.real, f"{name}_imaginary": values.imag}
+    if found.regulator is not None:
+        regulator = found.regulator * modes.scenario.scales.factor("concentration")
+        parts |= {"regulator_real": regulator.real, "regulator_imaginary": regulator.imag}
+    return {
+        "index": index,
+        "rate": list(modes.growth_rates[index]),
+        **{name: drawn(one) for name, one in parts.items()},
+    }

@@ -1,0 +1,187 @@
+// States of a run, a branch, a curve or a search as a line or as points in a plane of two of their numbers.
+
+import { Chart } from "./chart.js";
+import { choice } from "./choices.js";
+import { place as placeLabels } from "./labels.js";
+import { session } from "./session.js";
+import { limits, make } from "./svg.js";
+import { hideTip, showTip } from "./tip.js";
+import { view } from "./view.js";
+import { html, number, plain } from "./words.js";
+
+const REACH = 40;
+const MARKS = {
+  fold: "M-4 -4H4V4H-4Z", pitchfork: "M0 -5.5L5.5 0L0 5.5L-5.5 0Z", transcritical: "M0 -5.5L5.5 0L0 5.5L-5.5 0Z",
+  "branch-point": "M0 -5.5L5.5 0L0 5.5L-5.5 0Z", "fold-pitchfork": "M0 -5.5L5.5 0L0 5.5L-5.5 0Z",
+  "degenerate-pitchfork": "M0 -5.5L5.5 0L0 5.5L-5.5 0Z", cusp: "M0 -5L5 4H-5Z", turn: "M-4 -4H4V4H-4Z",
+  hopf: "M4.5 0A4.5 4.5 0 1 1 -4.5 0A4.5 4.5 0 1 1 4.5 0Z", "bogdanov-takens": "M4.5 0A4.5 4.5 0 1 1 -4.5 0A4.5 4.5 0 1 1 4.5 0Z",
+  state: "M5 0A5 5 0 1 1 -5 0A5 5 0 1 1 5 0Z", user: "M-2 -7H2V7H-2Z", end: "M2.5 0A2.5 2.5 0 1 1 -2.5 0A2.5 2.5 0 1 1 2.5 0Z",
+};
+const CROSS = "M-4 -6L0 -2L4 -6L6 -4L2 0L6 4L4 6L0 2L-4 6L-6 4L-2 0L-6 -4Z";
+
+export class Diagram extends Chart {
+  constructor(host, tools, legend) {
+    super(host, "Diagram of all states");
+    Object.assign(this, { tools, legend });
+    host.addEventListener("pointermove", (event) => this.hover(event));
+    host.addEventListener("pointerleave", () => this.leave());
+    host.addEventListener("click", (event) => {
+      const i = this.nearest(event);
+      if (this.table && i !== null) session.choose(this.table.places[i]);
+    });
+    session.on("state", () => this.table && this.mark());
+    view.on(["x", "y"], () => this.table && this.arrange());
+  }
+
+  get table() {
+    return session.overview?.table;
+  }
+
+  get names() {
+    const { columns } = this.table;
+    return { x: view.get("x") in columns ? view.get("x") : this.table.x, y: view.get("y") in columns ? view.get("y") : this.table.y };
+  }
+
+  arrange() {
+    const options = Object.keys(this.table.columns);
+    const { x, y } = this.names;
+    this.tools.replaceChildren(
+      choice("up", options, y, (name) => view.set({ y: name }), { id: "choose-y" }),
+      choice("across", options, x, (name) => view.set({ x: name }), { id: "choose-x" }),
+    );
+    this.describe();
+    this.due();
+  }
+
+  draw(width, height) {
+    if (!this.table) return;
+    const { columns, places } = this.table;
+    if (places.length < 2 && session.overview.noun === "run") {
+      this.say(places.length ? "One state, which `steady` stored." : "This run holds no state yet.");
+      return;
+    }
+    if (!places.length) {
+      this.say(`This ${session.overview.noun} holds no state yet.`);
+      return;
+    }
+    this.say("");
+    const { x, y } = this.names;
+    const [xs, ys] = [columns[x], columns[y]];
+    const layer = this.axes({
+      width, height, whole: x === "state", x: limits(xs.filter(Number.isFinite)), y: limits(ys.filter(Number.isFinite), 0.08),
+      xTitle: { name: x, ...session.quantity(x) }, yTitle: { name: y, ...session.quantity(y) },
+    });
+    this.lines(layer, xs, ys);
+    this.specials(layer, xs, ys);
+    this.marker = make("g");
+    this.pointer = make("g");
+    this.overlay.append(this.marker, this.pointer);
+    this.mark();
+  }
+
+  lines(layer, xs, ys) {
+    const { segments, line, outline, x, y } = this.table;
+    if (!line) return;
+    if (outline && this.names.x === x && this.names.y === y) {
+      layer.append(this.path(outline.x, outline.y, { class: "stable" }));
+      return;
+    }
+    if (!segments) {
+      layer.append(this.path(xs, ys, { class: session.overview.noun === "curve" ? "stable" : "first" }));
+      return;
+    }
+    for (let i = 0; i < segments.length;) {
+      let end = i + 1;
+      while (end < segments.length && kindOf(segments[end]) === kindOf(segments[i])) end++;
+      layer.append(this.path(xs.slice(i, end + 1), ys.slice(i, end + 1), { class: kindOf(segments[i]) }));
+      i = end;
+    }
+  }
+
+  specials(layer, xs, ys) {
+    const { labels, kinds } = this.table;
+    if (!labels) return;
+    const wanted = [];
+    labels.forEach((label, i) => {
+      if (!label || !Number.isFinite(xs[i]) || !Number.isFinite(ys[i])) return;
+      const [px, py] = [this.x(xs[i]), this.y(ys[i])];
+      layer.append(make("path", { class: "special", d: MARKS[kinds[i]] ?? CROSS, transform: `translate(${px} ${py})` }));
+      if (kinds[i] !== "end") wanted.push({ text: label, x: px, y: py });
+    });
+    const drawn = Array.from(xs, (value, i) => [this.x(value), this.y(ys[i])]).filter((one) => one.every(Number.isFinite));
+    placeLabels(wanted, drawn, this.box, layer);
+  }
+
+  mark() {
+    if (!this.marker) return;
+    this.marker.replaceChildren();
+    const i = this.table.places.indexOf(session.state?.place);
+    const { x, y } = this.names;
+    const [px, py] = [this.x(this.table.columns[x][i]), this.y(this.table.columns[y][i])];
+    if (Number.isFinite(px) && Number.isFinite(py)) this.marker.append(make("circle", { class: "here", cx: px, cy: py, r: 6 }));
+  }
+
+  nearest(event) {
+    const box = this.host.getBoundingClientRect();
+    const [px, py] = [event.clientX - box.left, event.clientY - box.top];
+    const { x, y } = this.names;
+    const [xs, ys] = [this.table.columns[x], this.table.columns[y]];
+    let [best, least] = [null, REACH];
+    for (let i = 0; i < xs.length; i++) {
+      // A named point is easier to hit than its neighbours.
+      const distance = Math.hypot(this.x(xs[i]) - px, this.y(ys[i]) - py) - (this.table.labels?.[i] ? 6 : 0);
+      if (distance < least) [best, least] = [i, distance];
+    }
+    return best;
+  }
+
+  hover(event) {
+    if (!this.table || !this.pointer || event.pointerType === "touch") return;
+    const i = this.nearest(event);
+    this.pointer.replaceChildren();
+    if (i === null) {
+      hideTip();
+      return;
+    }
+    const { x, y } = this.names;
+    const { columns, labels, unstable } = this.table;
+    this.pointer.append(make("circle", { class: "near", cx: this.x(columns[x][i]), cy: this.y(columns[y][i]), r: 8 }));
+    const told = [x, y].map((name) => `${plain(name)} ${number(columns[name][i])} ${html(unit(name))}`);
+    const head = labels?.[i] ? `<b>${labels[i]}</b><br>` : "";
+    showTip(event, `${head}${told.join("<br>")}${unstable ? `<br>${stabilityWords(unstable[i])}` : ""}`);
+  }
+
+  leave() {
+    this.pointer?.replaceChildren();
+    hideTip();
+  }
+
+  describe() {
+    const { segments, of } = this.table;
+    const known = new Set(segments?.map(kindOf) ?? []);
+    const words = { stable: "stable", unstable: "unstable", unknown: "stability not known" };
+    this.legend.replaceChildren(...Object.keys(words).filter((kind) => known.has(kind)).map((kind) => sample(kind, words[kind])));
+    if (of) this.legend.append(sample("stable", `${of}s`));
+  }
+}
+
+function kindOf(growing) {
+  return growing === null ? "unknown" : growing ? "unstable" : "stable";
+}
+
+function unit(name) {
+  const { unit: text } = session.quantity(name);
+  return text === "1" ? "" : text;
+}
+
+function sample(kind, words) {
+  const span = document.createElement("span");
+  const svg = make("svg", { viewBox: "0 0 26 10" }, make("path", { class: kind, d: "M0 5H26" }));
+  span.append(svg, words);
+  return span;
+}
+
+export function stabilityWords(growing) {
+  if (growing === null || growing === undefined) return "stability not known";
+  return growing === 0 ? "stable" : `${growing} growing mode${growing === 1 ? "" : "s"}`;
+}

@@ -1,0 +1,36 @@
+// The numbers of a state.
+
+import { stabilityWords } from "./diagram.js";
+import { session } from "./session.js";
+import { escaped, html, number, plain } from "./words.js";
+
+export function showFacts(host) {
+  const { state } = session;
+  if (!state) {
+    host.replaceChildren();
+    return;
+  }
+  const { observables, parameters = {}, missing } = state;
+  const told = Object.entries(parameters).map(([name, value]) => `<span>${plain(name)} <b data-name="${name}" data-value="${value}" style="font-size:13px">${number(value, 7)}</b></span>`);
+  const time = state.time === undefined ? "" : `<span>time <b data-name="time" data-value="${state.time}" style="font-size:13px">${number(state.time)}</b> ${unitOf("time")}</span>`;
+  const head = `<p class="title"><b>${escaped(state.title)}</b>${badge(state)}${time}${told.join("")}</p>`;
+  const none = missing ? `<p>${escaped(missing[0].replaceAll("-", " "))}. ${escaped(missing[1])}</p>` : "";
+  const rows = Object.entries(observables).filter(([name]) => name !== "time").map(([name, value]) => {
+    const { symbol, meaning } = session.quantity(name);
+    return `<div title="${escaped(meaning)}"><dt>${plain(name)} <i>${html(symbol)}</i></dt>`
+      + `<dd data-name="${name}" data-value="${value}">${number(value)} <small>${unitOf(name)}</small></dd></div>`;
+  });
+  host.innerHTML = `${head}${none}<dl>${rows.join("")}</dl>`;
+}
+
+function unitOf(name) {
+  const { unit } = session.quantity(name);
+  return unit === "1" ? "" : html(unit);
+}
+
+function badge(state) {
+  const isKnown = state.unstable !== undefined && state.unstable !== null;
+  if (state.missing || (!isKnown && !state.rates)) return "";
+  const kind = isKnown ? (state.unstable ? "growing" : "") : "unknown";
+  return isKnown ? `<span class="badge ${kind}">${stabilityWords(state.unstable)}</span>` : "";
+}

@@ -1,0 +1,206 @@
+// A diagram as colours over the plane of two keys, with its boundaries drawn over.
+
+import { Chart } from "./chart.js";
+import { choice } from "./choices.js";
+import { gradient, MAPS, row, scaleFor, table } from "./colours.js";
+import { recall } from "./data.js";
+import { stabilityWords } from "./diagram.js";
+import { place as placeLabels } from "./labels.js";
+import { session } from "./session.js";
+import { make } from "./svg.js";
+import { hideTip, showTip } from "./tip.js";
+import { view } from "./view.js";
+import { html, number, plain } from "./words.js";
+
+const IS_STATE = 1;
+const NOT_COMPUTED = 0;
+
+export class Heatmap extends Chart {
+  constructor(host, tools, legend) {
+    super(host, "Map of all states");
+    Object.assign(this, { tools, legend });
+    this.canvas = document.createElement("canvas");
+    this.canvas.hidden = true;
+    host.prepend(this.canvas);
+    host.addEventListener("pointermove", (event) => this.hover(event));
+    host.addEventListener("pointerleave", () => this.leave());
+    host.addEventListener("click", (event) => {
+      const at = this.map && this.point(event);
+      if (at) session.choose([this.layer, ...at].join(","));
+    });
+    session.on("state", () => this.map && this.mark());
+    session.on("closed", () => { this.canvas.hidden = true; this.values = null; });
+    view.on(["of", "state"], () => this.map && this.arrange());
+    view.on(["mapcolours", "theme"], () => this.map && this.due());
+  }
+
+  get map() {
+    return session.overview?.map;
+  }
+
+  get name() {
+    return this.map.names.includes(view.get("of")) ? view.get("of") : this.map.of;
+  }
+
+  get layer() {
+    return Math.min(Number(view.get("state")) || 0, this.map.states.length - 1);
+  }
+
+  async arrange() {
+    const { map, name } = this;
+    const tools = [choice("colour", map.names, name, (of) => view.set({ of }), { id: "choose-of" })];
+    if (map.states.length > 1) {
+      const states = map.states.map((state, i) => [String(i), state]);
+      tools.push(choice("state", states, String(this.layer), (state) => this.changeState(state), { id: "choose-state" }));
+    }
+    tools.push(choice("as", ["auto", ...MAPS], view.get("mapcolours"), (chosen) => view.set({ mapcolours: chosen })));
+    this.tools.replaceChildren(...tools);
+    const wanted = name;
+    await session.attempt("", async () => {
+      const { values } = await recall("values", { store: view.get("store"), name });
+      if (this.map && wanted === this.name) this.values = values;
+    });
+    this.due();
+  }
+
+  changeState(state) {
+    view.set({ state });
+    const [, i, j] = view.get("place").split(",");
+    if (j !== undefined) session.choose([state, i, j].join(","));
+  }
+
+  draw(width, height) {
+    if (!this.map || !this.values) return;
+    this.say("");
+    const { x, y } = this.map;
+    const [xs, ys] = [x.values, y.values];
+    this.half = [(xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2];
+    const layer = this.axes({
+      width, height,
+      x: [xs[0] - this.half[0], xs.at(-1) + this.half[0]], y: [ys[0] - this.half[1], ys.at(-1) + this.half[1]],
+      xTitle: { name: x.key, ...session.quantity(x.key) }, yTitle: { name: y.key, ...session.quantity(y.key) },
+    });
+    this.paint(xs.length, ys.length);
+    this.boundaries(layer);
+    this.marker = make("g");
+    this.pointer = make("g");
+    this.overlay.append(this.marker, this.pointer);
+    this.mark();
+  }
+
+  /** One pixel for each point, blown up by the browser. */
+  paint(nx, ny) {
+    const { left, right, top, bottom } = this.box;
+    Object.assign(this.canvas, { width: nx, height: ny, hidden: false });
+    Object.assign(this.canvas.style, {
+      left: `${left}px`, top: `${top}px`, width: `${right - left}px`, height: `${bottom - top}px`,
+    });
+    const first = this.layer * nx * ny;
+    const values = this.values.subarray(first, first + nx * ny);
+    const codes = this.map.outcomes.subarray(first, first + nx * ny);
+    let [low, high] = [Infinity, -Infinity];
+    for (const value of this.values) {
+      if (value < low) low = value;
+      if (value > high) high = value;
+    }
+    const scale = scaleFor(low, high, view.get("mapcolours"), this.name);
+    const colours = table(scale.map);
+    const image = new ImageData(nx, ny);
+    const hatch = document.documentElement.dataset.theme === "dark" ? [62, 70, 82] : [214, 213, 207];
+    for (let j = 0; j < ny; j++) {
+      for (let i = 0; i < nx; i++) {
+        const k = j * nx + i;
+        const to = 4 * ((ny - 1 - j) * nx + i);
+        if (Number.isFinite(values[k])) {
+          const from = 3 * row(values[k], scale);
+          for (let c = 0; c < 3; c++) image.data[to + c] = 255 * colours[from + c];
+          image.data[to + 3] = 255;
+        } else if (codes[k] !== NOT_COMPUTED) {
+          for (let c = 0; c < 3; c++) image.data[to + c] = hatch[c];
+          image.data[to + 3] = 255;
+        }
+      }
+    }
+    this.canvas.getContext("2d").putImageData(image, 0, 0);
+    this.describe(scale, codes);
+  }
+
+  describe(scale, codes) {
+    const { symbol, unit } = session.quantity(this.name);
+    const bar = document.createElement("span");
+    bar.innerHTML = `<b>${plain(this.name)} ${html(symbol)}</b> <b>${number(scale.low, 4)}</b>`
+      + `<i class="bar" style="background:${gradient(scale)}"></i><b>${number(scale.high, 4)} ${unit === "1" ? "" : html(unit)}</b>`;
+    this.legend.replaceChildren(bar);
+    if (codes.some((code) => code !== IS_STATE && code !== NOT_COMPUTED)) {
+      const none = document.createElement("span");
+      none.innerHTML = '<i class="bar none"></i> no state';
+      this.legend.append(none);
+    }
+    if (codes.some((code) => code === NOT_COMPUTED)) {
+      const none = document.createElement("span");
+      none.textContent = "blank: not computed yet";
+      this.legend.append(none);
+    }
+  }
+
+  boundaries(layer) {
+    const wanted = [];
+    const drawn = [];
+    for (const { of, x: first, y: second, keys, labels } of this.map.boundaries ?? []) {
+      const isTurned = keys[0] === this.map.y.key;
+      const [x, y] = isTurned ? [second, first] : [first, second];
+      layer.append(this.path(x, y, { class: `boundary ${of}` }));
+      for (let k = 0; k < x.length; k++) drawn.push([this.x(x[k]), this.y(y[k])]);
+      for (const [text, a, b] of labels) {
+        const [px, py] = isTurned ? [this.x(b), this.y(a)] : [this.x(a), this.y(b)];
+        layer.append(make("circle", { class: "special", cx: px, cy: py, r: 4 }));
+        wanted.push({ text, x: px, y: py });
+      }
+    }
+    placeLabels(wanted, drawn, this.box, layer);
+  }
+
+  mark() {
+    if (!this.marker) return;
+    const [, i, j] = (session.state?.place ?? "").split(",").map(Number);
+    this.marker.replaceChildren();
+    if (!Number.isFinite(j)) return;
+    const [px, py] = [this.x(this.map.x.values[i]), this.y(this.map.y.values[j])];
+    const { left, right, top, bottom } = this.box;
+    this.marker.append(
+      make("line", { class: "cross", x1: px, x2: px, y1: top, y2: bottom }),
+      make("line", { class: "cross", x1: left, x2: right, y1: py, y2: py }),
+      make("circle", { class: "here", cx: px, cy: py, r: 6 }),
+    );
+  }
+
+  /** Numbers of the point under the pointer, null outside. */
+  point(event) {
+    const box = this.host.getBoundingClientRect();
+    const found = [[this.x, event.clientX - box.left, this.map.x.values], [this.y, event.clientY - box.top, this.map.y.values]]
+      .map(([scale, pixel, values], k) => Math.round((scale.inverse(pixel) - values[0]) / (2 * this.half[k])));
+    return found[0] >= 0 && found[1] >= 0 && found[0] < this.map.x.values.length && found[1] < this.map.y.values.length ? found : null;
+  }
+
+  hover(event) {
+    if (!this.map || !this.pointer || event.pointerType === "touch") return;
+    const at = this.point(event);
+    if (!at) {
+      this.leave();
+      return;
+    }
+    const { x, y, outcomes, meanings } = this.map;
+    const [i, j] = at;
+    const k = (this.layer * y.values.length + j) * x.values.length + i;
+    const { unit } = session.quantity(this.name);
+    const isCount = this.name === "n_unstable";
+    const value = outcomes[k] !== IS_STATE ? `<b>${meanings[outcomes[k]]?.[0] ?? "not computed"}</b>`
+      : isCount ? `<b>${stabilityWords(Number.isFinite(this.values[k]) ? this.values[k] : null)}</b>`
+      : `<b>${plain(this.name)} ${number(this.values[k])}</b> ${unit === "1" ? "" : html(unit)}`;
+    showTip(event, `${value}<br>${plain(x.key)} ${number(x.values[i])}<br>${plain(y.key)} ${number(y.values[j])}`);
+  }
+
+  leave() {
+    hideTip();
+  }
+}

@@ -1,0 +1,86 @@
+// The page: what is drawn where, and who listens to whom.
+
+import { Diagram } from "./diagram.js";
+import { copyLink, copyPython, showCommands, showHelp } from "./dialogs.js";
+import { showFacts } from "./facts.js";
+import { Heatmap } from "./heatmap.js";
+import { keysFor, listen } from "./keys.js";
+import { session } from "./session.js";
+import { Spectrum } from "./spectrum.js";
+import { Stage } from "./stage.js";
+import { Timeline } from "./timeline.js";
+import { view } from "./view.js";
+import { plain } from "./words.js";
+
+const element = (id) => document.getElementById(id);
+const places = ["diagram", "diagram-tools", "legend"].map(element);
+const diagram = new Diagram(...places);
+const heatmap = new Heatmap(...places);
+heatmap.svg.style.display = "none";
+const stage = new Stage();
+const timeline = new Timeline(element("timeline"));
+new Spectrum(element("spectrum"));
+
+const isDark = () => (view.get("theme") || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
+
+function showTheme() {
+  document.documentElement.dataset.theme = isDark() ? "dark" : "light";
+  stage.setTheme(isDark());
+}
+
+function changeTheme() {
+  view.set({ theme: isDark() ? "light" : "dark" });
+}
+
+session.on("stores", () => {
+  element("store").replaceChildren(...session.stores.map(({ name, noun, error }, i) => new Option(`${name} · ${error ? "not readable" : noun}`, i)));
+  element("store").value = view.get("store");
+});
+session.on("overview", () => {
+  const { overview } = session;
+  const isMap = overview.map !== undefined;
+  diagram.svg.style.display = isMap ? "none" : "";
+  heatmap.svg.style.display = isMap ? "" : "none";
+  (isMap ? heatmap : diagram).arrange();
+  const keys = isMap ? `${plain(overview.map.x.key)} and ${plain(overview.map.y.key)}` : plain(overview.table.x);
+  element("about").textContent = `${overview.scenario}: ${overview.noun}${overview.noun === "run" || overview.noun === "search" ? "" : ` in ${keys}`}, ${overview.outcome ?? "unfinished"}`;
+  document.title = `${overview.name} · shapespace`;
+});
+session.on("closed", () => {
+  for (const id of ["diagram-tools", "legend"]) element(id).replaceChildren();
+  for (const chart of [diagram, heatmap]) chart.svg.replaceChildren();
+  element("about").textContent = "";
+  showFacts(element("facts"));
+});
+session.on("state", () => {
+  showFacts(element("facts"));
+  for (const id of ["continue", "python"]) element(id).disabled = !session.state.python;
+});
+session.on("trouble", () => {
+  element("trouble").textContent = session.trouble;
+  element("trouble").hidden = session.trouble === "";
+});
+
+element("store").addEventListener("change", () => view.set({ store: element("store").value, place: "", mode: "", x: "", y: "", of: "", state: "0" }));
+view.on(["store"], () => {
+  element("store").value = view.get("store");
+  session.openStore();
+});
+view.on(["place"], () => {
+  if (session.overview && view.get("place") && view.get("place") !== session.wanted) session.choose(view.get("place"));
+});
+view.on(["theme"], showTheme);
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", showTheme);
+
+const keys = keysFor({ timeline, stage, changeTheme });
+listen(keys);
+element("continue").addEventListener("click", showCommands);
+element("python").addEventListener("click", copyPython);
+element("link").addEventListener("click", copyLink);
+element("theme").addEventListener("click", changeTheme);
+element("help").addEventListener("click", () => showHelp(keys));
+
+showTheme();
+await stage.start();
+showTheme();
+await session.open();

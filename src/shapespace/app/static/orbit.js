@@ -1,0 +1,67 @@
+// Turning the view by pointer, wheel and pinch.
+
+const START = { azimuth: 0.6, elevation: 0.32, zoom: 1 };
+
+export class Orbit {
+  constructor(host, changed) {
+    Object.assign(this, START, { changed });
+    this.pointers = new Map();
+    host.addEventListener("pointerdown", (event) => {
+      host.setPointerCapture(event.pointerId);
+      this.pointers.set(event.pointerId, [event.clientX, event.clientY]);
+    });
+    host.addEventListener("pointermove", (event) => this.move(event));
+    for (const name of ["pointerup", "pointercancel"]) host.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
+    host.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.turn(0, 0, Math.exp(-0.0012 * event.deltaY));
+    }, { passive: false });
+    host.addEventListener("dblclick", () => this.home());
+  }
+
+  move(event) {
+    const before = this.pointers.get(event.pointerId);
+    if (!before) return;
+    const now = [event.clientX, event.clientY];
+    if (this.pointers.size === 2) {
+      const [other] = [...this.pointers].filter(([id]) => id !== event.pointerId).map(([, at]) => at);
+      const apart = (one) => Math.hypot(one[0] - other[0], one[1] - other[1]) || 1;
+      this.turn(0, 0, apart(now) / apart(before));
+    } else {
+      this.turn(-0.008 * (now[0] - before[0]), 0.008 * (now[1] - before[1]), 1);
+    }
+    this.pointers.set(event.pointerId, now);
+  }
+
+  turn(across, up, zoom) {
+    this.azimuth += across;
+    this.elevation = Math.max(-1.55, Math.min(1.55, this.elevation + up));
+    this.zoom = Math.max(0.3, Math.min(8, this.zoom * zoom));
+    this.changed();
+  }
+
+  home() {
+    Object.assign(this, START);
+    this.changed();
+  }
+
+  place(camera, reach) {
+    const distance = reach / this.zoom;
+    camera.position.set(
+      distance * Math.cos(this.elevation) * Math.sin(this.azimuth),
+      distance * Math.sin(this.elevation),
+      distance * Math.cos(this.elevation) * Math.cos(this.azimuth),
+    );
+    camera.up.set(0, 1, 0);
+    camera.lookAt(0, 0, 0);
+  }
+
+  text() {
+    return [this.azimuth, this.elevation, this.zoom].map((one) => one.toFixed(3)).join(",");
+  }
+
+  read(text) {
+    const values = text.split(",").map(Number);
+    if (values.length === 3 && values.every(Number.isFinite)) [this.azimuth, this.elevation, this.zoom] = values;
+  }
+}

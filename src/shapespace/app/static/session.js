@@ -1,0 +1,155 @@
+// What is open now: the overview of a store, the chosen state, its mode; told to whoever draws it.
+
+import { ask, forget, recall } from "./data.js";
+import { view } from "./view.js";
+
+export const session = new (class extends EventTarget {
+  stores = [];
+  overview = null;
+  state = null;
+  mode = null;
+  trouble = "";
+  waiting = "";
+  asked = 0;
+  wanted = "";
+
+  tell(name, detail) {
+    this.dispatchEvent(new CustomEvent(name, { detail }));
+  }
+
+  on(name, listener) {
+    this.addEventListener(name, (event) => listener(event.detail));
+  }
+
+  /** Quantity of a name: symbol, meaning, unit. */
+  quantity(name) {
+    const [symbol, meaning, unit] = this.overview?.quantities[name] ?? ["", name.replaceAll("_", " "), "1"];
+    return { symbol, meaning, unit };
+  }
+
+  /** Places of all states in their order; of a map none. */
+  get places() {
+    return this.overview?.table?.places ?? [];
+  }
+
+  async open() {
+    await this.attempt("reading the store", async () => {
+      this.stores = (await ask("stores")).stores;
+      this.tell("stores");
+      await this.openStore();
+    });
+  }
+
+  async openStore() {
+    forget();
+    Object.assign(this, { overview: null, state: null, mode: null });
+    this.tell("closed");
+    await this.attempt("reading the store", async () => {
+      this.overview = await ask("overview", { store: view.get("store") });
+      this.tell("overview");
+      const place = view.get("place") || firstPlace(this.overview);
+      if (place) await this.choose(place);
+    });
+  }
+
+  /** Show the state at a place; one that is asked for later wins. */
+  async choose(place) {
+    const number = ++this.asked;
+    this.wanted = place;
+    const store = view.get("store");
+    if (this.mode || (view.get("mode") && place !== view.get("place") && this.state)) this.stopMode();
+    view.set({ place });
+    await this.attempt("", async () => {
+      const state = await recall("state", { store, place });
+      if (number !== this.asked) return;
+      const settled = state.fields || state.missing ? state : { ...state, fields: this.state?.fields, isComing: true };
+      this.state = settled;
+      this.tell("state");
+      if (settled.isComing) await this.shape(number, store, place, state);
+      if (view.get("mode") && !this.mode && this.state.fields) await this.animate(Number(view.get("mode")));
+    });
+  }
+
+  /** The shape of a state that the store has as numbers only. */
+  async shape(number, store, place, state) {
+    await this.attempt("computing the shape again …", async () => {
+      const shape = await recall("shape", { store, place });
+      if (number !== this.asked) return;
+      this.state = { ...shape, ...state, fields: shape.fields };
+      this.tell("state");
+    }, () => {
+      if (number !== this.asked) return;
+      this.state = { ...state, fields: null };
+      this.tell("state");
+    });
+  }
+
+  /** Growth rates of a state that has none stored. */
+  async compute() {
+    const { state } = this;
+    await this.attempt("computing growth rates …", async () => {
+      const rates = await recall("spectrum", { store: view.get("store"), place: state.place });
+      if (state !== this.state) return;
+      this.state = { ...state, rates };
+      this.tell("state");
+    });
+  }
+
+  /** Set the surface swinging along a mode. */
+  async animate(index) {
+    const { state } = this;
+    await this.attempt(state.can_compute ? "computing the mode …" : "", async () => {
+      const mode = await recall("mode", { store: view.get("store"), place: state.place, index });
+      if (state.place !== this.state?.place) return;
+      this.mode = mode;
+      view.set({ mode: index });
+      this.tell("mode");
+    });
+  }
+
+  stopMode() {
+    this.mode = null;
+    view.set({ mode: "" });
+    this.tell("mode");
+  }
+
+  /** Do something that may fail, and say so. */
+  async attempt(words, act, failed) {
+    this.waiting = words;
+    document.body.dataset.busy = "true";
+    this.tell("waiting");
+    try {
+      await act();
+      this.trouble = "";
+    } catch (error) {
+      this.trouble = error.message;
+      failed?.();
+    } finally {
+      this.waiting = "";
+      document.body.dataset.busy = "false";
+      this.tell("waiting");
+      this.tell("trouble");
+    }
+  }
+})();
+
+/** The state to show first: the end of a run, the first label of a branch, the middle of a map. */
+function firstPlace(overview) {
+  if (overview.map) {
+    const { x, y, outcomes } = overview.map;
+    const [nx, ny] = [x.values.length, y.values.length];
+    const found = [];
+    for (let j = 0; j < ny; j++) {
+      for (let i = 0; i < nx; i++) {
+        if (outcomes[j * nx + i] === 1) found.push([Math.hypot(i - nx / 2, j - ny / 2), i, j]);
+      }
+    }
+    if (!found.length) return "0,0,0";
+    const [, i, j] = found.reduce((best, one) => (one[0] < best[0] ? one : best));
+    return `0,${i},${j}`;
+  }
+  const { places, labels } = overview.table;
+  if (overview.noun === "run") return places.at(-1) ?? "";
+  const i = labels?.findIndex((label) => label) ?? 0;
+  return places[Math.max(i, 0)] ?? "";
+}

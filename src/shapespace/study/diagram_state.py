@@ -1,0 +1,99 @@
+"""The state at a point of a stored diagram, which holds numbers only: computed again from what is known nearby."""
+
+from collections import OrderedDict
+from pathlib import Path
+
+import numpy as np
+
+from shapespace.analysis.stationary import Stationary, step_to
+from shapespace.analysis.sweeping import SWEEP_NEWTON
+from shapespace.base.errors import InputError, StoreError
+from shapespace.base.outcome import Outcome
+from shapespace.study.diagram_store import CODES, DiagramStore, open_diagram
+from shapespace.study.keyed import KeyedProblem
+from shapespace.study.scenario import Scenario
+from shapespace.study.steady import Steady
+from shapespace.study.tiles import Surveyor, find_state
+
+KEPT = 64
+"""States to go on from: those beside a known one are a few Newton steps away."""
+SHORTEST = 1.0 / 16.0
+"""Of the way from a known state that is worth a step, before the tile is computed again."""
+
+Place = tuple[int, int, int]
+"""Number of the state, and of the values along x and y."""
+
+
+class DiagramStates:
+    """The states of a stored diagram, each checked against what is stored of it."""
+
+    def __init__(self, path: str | Path) -> None:
+        self._store = DiagramStore.open(path)
+        self._diagram = open_diagram(path)
+        self._grid = self._store.request.grid
+        self._anchors = [*self._store]
+        self._surveyor = Surveyor(self._store.scenario, self._grid.keys, stability=False)
+        self._known: OrderedDict[Place, Stationary] = OrderedDict()
+
+    def scenario_at(self, place: Place) -> Scenario:
+        """The scenario with the values of both keys there."""
+        keys = zip(self._grid.keys, self._grid.values(*place[1:]).ravel().tolist(), strict=True)
+        return self._store.scenario.with_overrides(dict(keys))
+
+    def state(self, place: Place) -> Steady:
+        """The state at a point. InputError where the diagram has none, StoreError where it is not found again."""
+        codes = self._store.outcomes if place not in self._known else None
+        if codes is not None and codes[place] != CODES[Outcome.CONVERGED]:
+            raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
+        number, at = place[0], (place[1], place[2])
+        found = self._known.get(place) or self._stepped(place)
+        if found is None:
+            found = find_state(self._store, self._diagram, number, at)
+        if found is None:
+            raise StoreError(f"{self._store.path}: the state at this point was not found again; resume the diagram.")
+        self._known[place] = found
+        self._known.move_to_end(place)
+        if len(self._known) > KEPT:
+            self._known.popitem(last=False)
+        assert isinstance(found.problem, KeyedProblem)
+        return Steady(self.scenario_at(place), found.problem, found)
+
+    def anchor(self, place: Place) -> int | None:
+        """The number of the nearest tile in whose middle the state is stored, None where there is none."""
+        anchors = self._anchors[place[0]] if place[0] < len(self._anchors) else None
+        if anchors is None:
+            return None
+        known = [number for number, outcome in enumerate(anchors.outcomes) if outcome is Outcome.CONVERGED]
+        return min(known, key=lambda number: self._distance(self._middle(number), place), default=None)
+
+    def _stepped(self, place: Place) -> Stationary | None:
+        """By a few long steps from the nearest known state; None where they lead elsewhere."""
+        number = self.anchor(place)
+        if number is None:
+            return None
+        near = min(
+            (one for one in self._known if one[0] == place[0]),
+            key=lambda one: self._distance((one[1], one[2]), place),
+            default=None,
+        )
+        middle = self._middle(number)
+        if near is not None and self._distance((near[1], near[2]), place) <= self._distance(middle, place):
+            start = self._known[near]
+        else:
+            anchors = self._anchors[place[0]]
+            values = self._grid.values(*middle).reshape(2)
+            start = self._surveyor.state(anchors.meshes[number], anchors.xs[number], values)
+        goal = self._grid.values(*place[1:]).reshape(2)
+        found = step_to(start, goal, SWEEP_NEWTON, SHORTEST) if not np.array_equal(start.p, goal) else start
+        is_found = found.outcome.is_success and self._surveyor.is_stored(
+            found, self._diagram, place[0], (place[1], place[2])
+        )
+        return found if is_found else None
+
+    def _middle(self, tile: int) -> tuple[int, int]:
+        i, j = self._grid.tiles[tile]
+        return int(self._grid.x.anchors[i]), int(self._grid.y.anchors[j])
+
+    @staticmethod
+    def _distance(one: tuple[int, int], place: Place) -> int:
+        return abs(one[0] - place[1]) + abs(one[1] - place[2])

@@ -1,0 +1,52 @@
+"""Stores to explore, made once, and explorers that serve them. Imports come late: jax must find its cache configured."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import TYPE_CHECKING
+
+import pytest
+
+if TYPE_CHECKING:
+    from tests.app.browser import Browser
+    from tests.app.served import Stores
+
+    from shapespace.app.explore import Explorer
+
+
+@pytest.fixture(scope="session")
+def stores(tmp_path_factory: pytest.TempPathFactory) -> "Stores":
+    """To be read only."""
+    from tests.app.served import Stores
+    from tests.app.stores import make_branch, make_map, make_run
+
+    folder = tmp_path_factory.mktemp("explored")
+    return Stores(make_run(folder / "run"), make_branch(folder / "branch"), make_map(folder / "map", 100))
+
+
+@pytest.fixture(scope="session")
+def explorer(stores: "Stores") -> "Iterator[Explorer]":
+    """Serving all of them."""
+    from tests.app.served import serving
+
+    with serving(*stores) as found:
+        yield found
+
+
+@pytest.fixture
+def serve() -> "Iterator[Callable[..., Explorer]]":
+    """Serves stores until the test ends."""
+    from tests.app.served import serving
+
+    with ExitStack() as stack:
+        yield lambda *paths: stack.enter_context(serving(*paths))
+
+
+@pytest.fixture(scope="session")
+def browser() -> "Iterator[Browser]":
+    """A browser for all tests."""
+    from tests.app.browser import PROGRAM, chromium
+
+    if PROGRAM is None:
+        pytest.skip("needs Chromium (Debian: apt install chromium)")
+    with chromium() as found:
+        yield found

@@ -1,0 +1,71 @@
+"""Small stores of every kind, and a large map of spheres, whose states are known without solving."""
+
+from pathlib import Path
+
+import numpy as np
+
+from shapespace.base.outcome import Outcome
+from shapespace.study.branching import branch
+from shapespace.study.diagram_store import CODES, OUTCOME, Anchors, DiagramRequest, DiagramStore
+from shapespace.study.diagrams import make_request
+from shapespace.study.engine import Engine
+from shapespace.study.grid import Axis, Grid
+from shapespace.study.run import run
+from shapespace.study.scenario import Scenario, scenario
+from shapespace.study.steady import observables_at, reference
+from shapespace.study.tiles import observable_names
+
+X, Y = "peclet", "inverse_hydrodynamic_length"
+
+
+def swimmer(**changes: float) -> Scenario:
+    """On few elements."""
+    return scenario("polar-swimmer", elements=20, mesh_tolerance=1e-3, **changes)
+
+
+def make_branch(path: Path) -> Path:
+    """The sphere through the onset of swimming."""
+    branch(swimmer(), X, 24.0, start=20.0, at=(23.0,), state="trivial", out=path)
+    return path
+
+
+def make_run(path: Path, until: float = 0.02) -> Path:
+    """The first steps of a division."""
+    run(scenario("guided-division", elements=20, mesh_tolerance=1e-3, until=until), out=path)
+    return path
+
+
+def make_map(path: Path, count: int) -> Path:
+    """A map of spheres at rest; its velocity is made up, so that there is something to see."""
+    at = reference(swimmer())
+    grid = Grid(Axis(X, 10.0, 20.0, count), Axis(Y, 0.5, 5.0, count))
+    request: DiagramRequest = make_request(at, grid, ("trivial",), stability=False)
+    with DiagramStore.create(path, at, request, observable_names(at, grid.keys)) as store:
+        store.append(_spheres(at, grid))
+        engine = Engine.of(at)
+        known = observables_at(at, engine.problem, engine.problem.pack(engine.initial_state()))
+        names = [name for name in observable_names(at, grid.keys) if name in known]
+        for tile in grid.tiles:
+            x, y = grid.span(tile)
+            q = grid.values(x, y)
+            values = {name: np.full((1, *q.shape[:2]), known[name]) for name in names}
+            values["velocity"] = made_up(q[..., 0], q[..., 1])[None]
+            values[OUTCOME] = np.full((1, *q.shape[:2]), CODES[Outcome.CONVERGED], np.int8)
+            store.write_tile(tile, values)
+        store.finish(Outcome.COMPLETE)
+    return path
+
+
+def made_up(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The velocity of a map of spheres."""
+    return np.sin(x) * np.cos(y) - 0.1 * x
+
+
+def _spheres(at: Scenario, grid: Grid) -> Anchors:
+    meshes, xs = [], []
+    for i, j in grid.tiles:
+        q = grid.values(grid.x.anchors[i], grid.y.anchors[j]).reshape(2)
+        engine = Engine.of(at.with_overrides({X: q[0], Y: q[1]}))
+        meshes.append(engine.problem.mesh)
+        xs.append(engine.problem.pack(engine.initial_state()))
+    return Anchors("trivial", (Outcome.CONVERGED,) * len(xs), tuple(meshes), tuple(xs))
