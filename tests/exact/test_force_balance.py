@@ -97,7 +97,7 @@ def pulled(ends: dict[str, tuple[object, object]]) -> tuple[Engine, Moment]:
 
 
 def rim(engine: Engine, last: Moment) -> dict[str, float]:
-    """Tension gamma_H if there is one, moment and axial force 2 pi r t_z at the rim, and the axial force from outside on all of the surface."""
+    """At the rim gamma_H if there is one, the moment and the axial force 2 pi r t_z; the axial force from outside on all."""
     assert last.rate is not None
     s = surface_of(engine, last.x, last.rate)
     t = tensors_of(engine, s)

@@ -138,7 +138,19 @@ REFUSED = {
     "motion": (energy(lambda divergence, kappa: kappa * divergence), "an energy cannot depend on the motion"),
     "gradient": (energy(lambda concentration_gradient, kappa: kappa), "concentration_gradient is not supported"),
     "unit": (energy(lambda total_curvature, kappa: kappa * total_curvature), "its unit is not E/L\\^2; .* of kappa"),
-    "pole": (energy(lambda radius, kappa: kappa / radius**2), "is not finite at a pole"),
+    "pole": (energy(lambda radius, kappa: kappa / radius**2), "is not finite at the pole u = 0, where radius = 0"),
+    "far pole": (
+        energy(lambda tangent_angle, modulus: modulus / (1.0 + jnp.cos(tangent_angle))),
+        "is not finite at the pole u = 1, where radius = 0, tangent_angle = 3.14",
+    ),
+    "numpy": (
+        energy(lambda tangent_angle, modulus: modulus * np.cos(tangent_angle)),
+        "cannot be differentiated .* write it with jax.numpy",
+    ),
+    "branching": (
+        energy(lambda tangent_angle, modulus: modulus if float(tangent_angle[0]) > 1.0 else 2.0 * modulus),
+        "cannot be differentiated",
+    ),
     "everywhere": (energy(lambda radius, modulus: modulus * jnp.sqrt(-radius / radius)), "is not finite inside"),
     "shape": (energy(lambda radius, modulus: modulus * jnp.ones((3, 3))), "one number per point"),
     "linear": (dissipation("bulk")(lambda divergence, modulus: modulus * divergence), "must be quadratic"),
@@ -153,6 +165,28 @@ def test_what_cannot_be_is_refused(case: str):
     law, message = REFUSED[case]
     with pytest.raises(ValueError, match=message):
         check_law(law, VALUES, DIMENSIONS)
+
+
+ROUGH = {
+    "kink": energy(lambda total_curvature, c_0, modulus: modulus * jnp.abs(total_curvature / c_0 - 1.0)),
+    "step": energy(lambda concentration, c0, modulus: modulus * jnp.where(concentration > c0, 1.0, 0.0)),
+    "corner": energy(lambda concentration, c0, modulus: modulus * jnp.maximum(concentration / c0, 1.0)),
+}
+
+
+@pytest.mark.parametrize("case", ROUGH)
+def test_laws_that_are_not_smooth_are_admitted_with_a_warning(case: str):
+    """It names the place."""
+    place = "concentration = 1.5\\." if case != "kink" else "total_curvature = 0.8\\."
+    with pytest.warns(UserWarning, match=rf"<lambda>: is not smooth: .* near {place} .*round it off"):
+        admitted(ROUGH[case])
+
+
+def test_steep_laws_are_smooth(recwarn: pytest.WarningsRecorder):
+    """A coat's edge, and a law that is flat over most of its range."""
+    admitted(energy(lambda material_area, c_0, modulus: modulus * jnp.tanh(250.0 * (material_area * c_0**2 - 0.3))))
+    admitted(energy(lambda concentration, c0, modulus: modulus * jnp.exp(-((concentration / c0 - 1.0) ** 2) * 1e4)))
+    assert not recwarn.list
 
 
 def test_unknown_channels_and_sources_are_named():

@@ -1,7 +1,10 @@
 """Surfaces that are not well posed are refused, and told what is missing."""
 
+from dataclasses import replace
+
 import pytest
 
+from shapespace.models import vesicle
 from shapespace.variational.ends import Free, Pinned, check_count, check_ends
 
 
@@ -20,3 +23,8 @@ def test_rates_without_ends_and_ends_without_rates_are_named():
     check_ends({"r": both, "z": both}, ("r", "z"))
     with pytest.raises(ValueError, match=r"missing \['z'\], surplus \['psi'\]"):
         check_ends({"r": both, "psi": both}, ("r", "z"))
+
+
+def test_two_terms_that_fix_the_same_field_are_named():
+    with pytest.raises(ValueError, match="incompressible and fixed_area both fix the area"):
+        replace(vesicle.RECIPE, incompressible=True).system()

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+from shapespace.physics.laws import Law
 from shapespace.physics.species import Species
 from shapespace.physics.term import AbstractTerm
 from shapespace.variational.ends import Ends, Pinned
@@ -12,7 +13,10 @@ from shapespace.variational.surface import SurfaceSystem, TermFactory, make_surf
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
-    """The choices of a model. `ends`: without those of v_phi, which is pinned at both where nothing else is said."""
+    """The choices of a model. `ends`: without those of v_phi, which is pinned at both where nothing else is said.
+
+    laws: those of users among the terms, which every scenario's values must admit.
+    """
 
     parameters: tuple[str, ...]
     terms: TermFactory
@@ -23,6 +27,7 @@ class Recipe:
     fixed_area: bool = False
     comoving: bool = False
     material_area: bool = False
+    laws: tuple[Law, ...] = ()
 
     def system(self, azimuthal: bool = False) -> SurfaceSystem:
         """The surface, with or without azimuthal flow as an unknown."""
@@ -48,8 +53,13 @@ class Recipe:
         without: tuple[str, ...] = (),
         ends: Ends | None = None,
         species: Callable[[Any], Species] | None = None,
+        laws: tuple[Law, ...] = (),
+        **held: bool,
     ) -> "Recipe":
-        """With more parameters and terms, without the terms of some classes, with other ends or another species law."""
+        """With more parameters and terms, without the terms of some classes, with other ends or another species law.
+
+        held: other values of incompressible, fixed_volume, fixed_area, ...
+        """
         base = self.terms
 
         def all_terms(p: Any) -> tuple[AbstractTerm, ...]:
@@ -61,4 +71,6 @@ class Recipe:
             terms=all_terms,
             ends={**self.ends, **(ends or {})},
             species=species or self.species,
+            laws=laws,
+            **held,
         )

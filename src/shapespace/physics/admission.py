@@ -1,8 +1,10 @@
 """What a law must be to enter a model, tested before anything is computed: ValueError names the law and what is wrong."""
 
 import difflib
+import warnings
 from collections.abc import Mapping
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 
@@ -12,6 +14,7 @@ from shapespace.geometry.curve import Geometry
 from shapespace.geometry.motion import Rates
 from shapespace.physics.laws import Law
 from shapespace.physics.quantities import LOCAL_QUANTITIES, local_values
+from shapespace.physics.smoothness import rough_place
 from shapespace.physics.term import CHANNELS, Ledger, Site
 
 SAMPLES = 64
@@ -46,24 +49,67 @@ def check_law(law: Law, values: Mapping[str, float], dimensions: Mapping[str, Di
     arguments = {name: np.asarray(value) for name, value in local.items()}
     constants = {name: values[name] for name in law.constants}
     value = _finite(law, arguments, constants, "inside")
-    limits = {name: np.asarray(v) for name, v in local_values(law.quantities, _sites(pole=True), at_pole=True).items()}
-    _finite(law, limits, constants, "at a pole, where radius = 0 and quantities have their limits")
+    for end, angle in enumerate((0.0, np.pi)):
+        limits = local_values(law.quantities, _sites(pole=angle), at_pole=True)
+        where = f"at the pole u = {end}, where radius = 0, tangent_angle = {angle:.3g} and all else has its limit"
+        _finite(law, {name: np.asarray(v) for name, v in limits.items()}, constants, where)
     _check_motion(law, arguments, constants, value)
     _check_unit(law, arguments, constants, value, dimensions)
+    check_second_law(law, values)
+    _warn_where_rough(law, arguments, constants)
 
 
-def _sites(pole: bool = False) -> Site:
-    """Unrelated shapes and motions (SAMPLES,), or such at poles."""
+def check_second_law(law: Law, values: Mapping[str, float]) -> None:
+    """ValueError where a law breaks reciprocity or the second law with these values of the parameters."""
+    arguments = {name: np.asarray(v) for name, v in local_values(law.quantities, _sites()).items()}
+    constants = {name: values[name] for name in law.constants}
+    if law.check is not None:
+        try:
+            law.check(arguments, constants)
+        except ValueError as error:
+            raise ValueError(f"{law.name}: {error}") from None
+    if law.ledger not in CHANNELS:
+        return
+    value = _finite(law, arguments, constants, "inside")
+    if value.min() < -TOLERANCE * np.abs(value).max():
+        given = ", ".join(f"{name} = {arguments[name][value.argmin()]:.3g}" for name in law.quantities)
+        raise ValueError(
+            f"{law.name}: breaks the second law: it is {value.min():.3g} < 0 at {given} with "
+            f"{', '.join(f'{name} = {number:g}' for name, number in constants.items())}; a dissipation is never negative."
+        )
+
+
+def _warn_where_rough(law: Law, arguments: Mapping[str, Array], constants: Mapping[str, float]) -> None:
+    """Warn of steps and kinks; ValueError where the function cannot be differentiated at all."""
+    if not arguments:
+        return
+    try:
+        place = rough_place(lambda **local: jnp.asarray(law.function(**local, **constants)), arguments)
+    except (jax.errors.JAXTypeError, TypeError) as error:
+        raise ValueError(
+            f"{law.name}: cannot be differentiated ({str(error).splitlines()[0]}); write it with jax.numpy, without if."
+        ) from None
+    if place is not None:
+        where = ", ".join(f"{name} = {value:.3g}" for name, value in place.items())
+        warnings.warn(
+            f"{law.name}: is not smooth: its value or slope jumps near {where}. Newton's method may fail there; round it off, "
+            "e.g. sqrt(x^2 + small^2) for |x|, (1 + tanh(x/width))/2 for a step.",
+            stacklevel=2,
+        )
+
+
+def _sites(pole: float | None = None) -> Site:
+    """Unrelated shapes and motions (SAMPLES,), or such at the pole with this tangent angle."""
     rng = np.random.default_rng(0)
 
     def between(low: float, high: float) -> Traced:
         return jnp.asarray(rng.uniform(low, high, SAMPLES))
 
-    r = jnp.zeros(SAMPLES) if pole else between(0.4, 2.0)
-    psi = jnp.where(between(0.0, 1.0) < 0.5, 0.0, jnp.pi) if pole else between(-np.pi, np.pi)
+    r = between(0.4, 2.0) if pole is None else jnp.zeros(SAMPLES)
+    psi = between(-np.pi, np.pi) if pole is None else jnp.full(SAMPLES, pole)
     shape = Geometry(r, psi, between(-2.0, 2.0), between(0.5, 3.0), between(0.0, 1.2))
     rates, gradients = (Rates(*(between(-2.0, 2.0) for _ in range(6))) for _ in range(2))
-    if pole:
+    if pole is not None:
         rates = rates._replace(r=r, meridional_velocity=r, azimuthal_velocity=r)
     return Site(shape, rates, gradients, between(0.2, 3.0), between(-2.0, 2.0))
 
@@ -90,12 +136,6 @@ def _check_motion(law: Law, arguments: Mapping[str, Array], constants: Mapping[s
         word = "quadratic in velocities and strain rates (a dissipation)" if degree == 2 else "linear in them (a power)"
         raise ValueError(
             f"{law.name}: must be {word}; at -3 times the motion it is not {(-3) ** degree} times as large."
-        )
-    if degree == 2 and value.min() < -TOLERANCE * np.abs(value).max():
-        given = ", ".join(f"{name} = {arguments[name][value.argmin()]:.3g}" for name in law.quantities)
-        raise ValueError(
-            f"{law.name}: breaks the second law: it is {value.min():.3g} < 0 at {given} with "
-            f"{', '.join(f'{name} = {number:g}' for name, number in constants.items())}; a dissipation is never negative."
         )
 
 

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 
 import equinox as eqx
 
-from shapespace.base.arrays import Traced
+from shapespace.base.arrays import Array, Traced
 from shapespace.geometry.curve import Geometry, area_element
 from shapespace.geometry.motion import Rates
 from shapespace.physics.quantities import LOCAL_QUANTITIES, local_values
@@ -22,10 +22,14 @@ LawFunction = Callable[..., Traced]
 
 @dataclass(frozen=True)
 class Law:
-    """One law: its function, and where its power is booked. Make it with `energy`, `dissipation` or `power`."""
+    """One law: its function, and where its power is booked. Make it with `energy`, `dissipation`, `power` or `linear_laws`.
+
+    check: what else must hold, given the local quantities at sample points and the parameters; ValueError if it does not.
+    """
 
     function: LawFunction
     ledger: Ledger
+    check: Callable[[Mapping[str, Array], Mapping[str, float]], None] | None = None
 
     @property
     def name(self) -> str:

@@ -1,11 +1,12 @@
 """A scenario as a problem: the model's system on a mesh, its parameters and its initial state, all dimensionless."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
 from shapespace.base.arrays import Array
+from shapespace.base.errors import InputError
 from shapespace.geometry.spheroid import Spheroid
 from shapespace.models import closed_surface, open_membrane, vesicle
 from shapespace.models.recipe import Recipe
@@ -14,6 +15,7 @@ from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.pointwise import name_system
 from shapespace.numerics.state import State, state_from_functions
+from shapespace.physics.admission import check_second_law
 from shapespace.study.frame import Frame
 from shapespace.study.keys import MODELS
 from shapespace.study.scenario import Scenario
@@ -40,6 +42,16 @@ def _system(recipe: Recipe, azimuthal: bool) -> SurfaceSystem:
         if recipe is shipped:
             name_system(system, f"{name}, azimuthal: {azimuthal}")
     return system
+
+
+@lru_cache(maxsize=64)
+def _admit(recipe: Recipe, values: tuple[tuple[str, float], ...]) -> None:
+    """InputError where a law of the user's breaks the second law with these values."""
+    for law in recipe.laws:
+        try:
+            check_second_law(law, dict(values))
+        except ValueError as error:
+            raise InputError(str(error)) from None
 
 
 BALL = 4.0 / 3.0 * np.pi
@@ -72,6 +84,7 @@ class Engine:
             values["enclosed_volume"] = BALL * values["area_radius"] ** 3 * values["reduced_volume"]
             values["surface_area"] = 4.0 * np.pi * values["area_radius"] ** 2
             values["initial_oblate"] = float(scenario.values()["initial_oblate"])
+        _admit(recipe_of(scenario.model), tuple(values.items()))
         p = np.array([values[name] for name in system.parameters])
         mesh = uniform_mesh(numerics.elements)
         return cls(CollocationProblem(system, mesh, numerics.degree, numerics.mesh_tolerance), p, values)

@@ -22,7 +22,7 @@ from shapespace.study.keys import MODELS, Model, nearest, replace_keys
 from shapespace.study.scenario import TEMPLATES, scenario_names, template
 from shapespace.variational.ends import Ends
 
-_ALLOWED = ("energy", "dissipation", "power")
+_ALLOWED = ("energy", "dissipation", "power", "linear_laws")
 
 
 @dataclass(frozen=True)
@@ -42,20 +42,24 @@ class Parameter:
 def define_model(
     name: str,
     like: str,
-    laws: Sequence[Law],
+    laws: Sequence[Law | Sequence[Law]],
     parameters: Mapping[str, Parameter] | None = None,
     *,
     without: Sequence[str] = (),
     ends: Ends | None = None,
     species: Any = None,
+    terms: Any = None,
+    **held: bool,
 ) -> None:
     """Add a model: the shipped one that it is like, with more laws and parameters; or the same again, to change it.
 
     without: classes of the shipped terms to leave out, e.g. "ActiveTension". ends, species: in place of those of the
-    shipped model (`variational.ends`, `physics.species`). ValueError where a law is not admissible (`physics.admission`),
-    InputError where a name is taken or unknown.
+    shipped model (`variational.ends`, `physics.species`). terms: of the parameters by name, further terms of the package
+    (`physics`). held: incompressible, fixed_volume, fixed_area as in `models.recipe`. ValueError where a law is not admissible
+    (`physics.admission`), InputError where a name is taken or unknown.
     """
     parameters = dict(parameters or {})
+    laws = _flat(laws)
     if like not in _shipped():
         raise InputError(f"like = {like!r}: is no shipped model; the nearest is {nearest(like, _shipped())}.")
     if name in _shipped():
@@ -71,8 +75,6 @@ def define_model(
     _check_terms(recipe, tuple(without))
     known = {key: QUANTITIES[key].dimension for key in recipe.parameters if key in QUANTITIES}
     for law in laws:
-        if not isinstance(law, Law):
-            raise InputError(f"{law!r}: is no law; make it one with @{', @'.join(_ALLOWED)}.")
         # Any numbers do: the tests are of form, at parameters of one; the user's own ones at their defaults.
         values = dict.fromkeys(known, 1.0) | {key: one.default for key, one in parameters.items()}
         check_law(law, values, known | dimensions)
@@ -82,10 +84,10 @@ def define_model(
     }
     record = create_model(f"{name}-parameters", __base__=shipped.sections["parameters"], **fields)
 
-    def terms(p: Any) -> tuple[AbstractTerm, ...]:
-        return tuple(law.term(p) for law in laws)
+    def all_terms(p: Any) -> tuple[AbstractTerm, ...]:
+        return (*(law.term(p) for law in laws), *(terms(p) if terms else ()))
 
-    made = recipe.extended(tuple(parameters), terms, tuple(without), ends, species)
+    made = recipe.extended(tuple(parameters), all_terms, tuple(without), ends, species, laws=laws, **held)
     # Conditions and unknowns are counted now, not at the first run.
     made.system()
     for key, one in parameters.items():
@@ -121,6 +123,21 @@ def define_scenario(name: str, title: str, model: str, like: str, **changes: flo
     TEMPLATES[name] = (
         f"# {title}\n#\n# The model {model}; all that is not stated here is as in {like}.\n{tomlkit.dumps(body)}"
     )
+
+
+def _flat(laws: Sequence[Law | Sequence[Law]]) -> tuple[Law, ...]:
+    """All laws; a matrix of linear laws makes two."""
+    found: list[Law] = []
+    for one in laws:
+        for law in one if isinstance(one, list | tuple) else (one,):
+            if not isinstance(law, Law):
+                raise InputError(f"{law!r}: is no law; make it one with @{', @'.join(_ALLOWED)}.")
+            found.append(law)
+    names = [law.name for law in found]
+    twice = [name for name in names if names.count(name) > 1]
+    if twice:
+        raise InputError(f"{twice[0]}: is given twice; leave one out, or give the functions different names.")
+    return tuple(found)
 
 
 def _shipped() -> list[str]:

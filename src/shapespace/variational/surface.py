@@ -247,6 +247,10 @@ def make_surface_system(
         raise ValueError(
             "material_area needs an incompressible surface: only there is the cumulative area a material label."
         )
+    if incompressible and fixed_area:
+        raise ValueError(
+            "incompressible and fixed_area both fix the area, so that neither tension has a value: keep one of them."
+        )
     multipliers = ["p"] * fixed_volume + ["sigma"] * fixed_area
     scalars = ("h", *multipliers, *(["v0"] if comoving else []))
     check_ends(ends, tuple(rates))
