@@ -144,6 +144,8 @@ QUANTITIES: dict[str, Quantity] = {
     "tangential_velocity": Quantity("v_u", "tangential velocity in the lab frame", _VELOCITY),
     "normal_velocity": Quantity("v_n", "normal velocity in the lab frame", _VELOCITY),
     "concentration": Quantity("c", "concentration of the stress regulator", _CONCENTRATION),
+    "second_concentration": Quantity("c_2", "concentration of the second species", _CONCENTRATION),
+    "azimuthal_velocity": Quantity("v_phi", "velocity about the axis", _VELOCITY),
     "local_spontaneous_curvature": Quantity("C0(u)", "local spontaneous curvature", _CURVATURE),
     "local_tension": Quantity("gamma_H", "local tension", _TENSION),
 }

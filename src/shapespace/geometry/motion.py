@@ -12,7 +12,10 @@ from shapespace.geometry.curve import Geometry, azimuthal_curvature, meridional_
 
 
 class Rates(NamedTuple):
-    """Rates w at one u: d/dt at fixed u of r, z, psi, h, and the tangential velocities; also used for their u-derivatives."""
+    """Rates w at one u: d/dt at fixed u of r, z, psi, h, and the tangential velocities; also used for their u-derivatives.
+
+    turning: d psi/dt of the matter, dpsi/dt + q^u psi', of surfaces that resist bending.
+    """
 
     r: Traced
     z: Traced
@@ -20,6 +23,7 @@ class Rates(NamedTuple):
     h: Traced
     meridional_velocity: Traced
     azimuthal_velocity: Traced
+    turning: Traced | float = 0.0
 
 
 class StrainRate(NamedTuple):
@@ -54,6 +58,26 @@ def strain_rate(g: Geometry, w: Rates, dw: Rates) -> StrainRate:
         phiphi=cot * w.meridional_velocity + azimuthal_curvature(g) * v_n,
         uphi=0.5 * (dw.azimuthal_velocity / g.h - cot * w.azimuthal_velocity),
     )
+
+
+def turning_rate(g: Geometry, w: Rates) -> Traced:
+    """d psi/dt of the matter: dpsi/dt + q^u psi' [1/time]."""
+    return w.psi + coordinate_flow(g, w) * g.dpsi / g.h
+
+
+def curvature_rate(g: Geometry, w: Rates, dw: Rates) -> Traced:
+    """d(2H)/dt of the matter, from w.turning = d psi/dt of the matter [1/(length time)].
+
+    With psi' and r' of the matter stretched by S: (turning' - psi' S_uu)/h + cos(psi) turning/r - C_phi^phi S_phiphi.
+    """
+    s = strain_rate(g, w, dw)
+    meridional = dw.turning / g.h - meridional_curvature(g) * s.uu
+    return meridional + jnp.cos(g.psi) / g.r * w.turning - azimuthal_curvature(g) * s.phiphi
+
+
+def vorticity(g: Geometry, w: Rates, dw: Rates) -> Traced:
+    """n . curl v = (r v_phi)'/(r h) [1/time]: twice the rate at which the matter spins about the normal."""
+    return dw.azimuthal_velocity / g.h + jnp.cos(g.psi) / g.r * w.azimuthal_velocity
 
 
 def divergence(g: Geometry, w: Rates, dw: Rates) -> Traced:

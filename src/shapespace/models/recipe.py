@@ -1,27 +1,32 @@
 """What a surface is made of, before its unknowns are chosen: parameters, terms, species, ends and what is held."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 from shapespace.physics.laws import Law
-from shapespace.physics.species import Species
+from shapespace.physics.storage import AbstractStorage
 from shapespace.physics.term import AbstractTerm
 from shapespace.variational.ends import Ends, Pinned
-from shapespace.variational.surface import SurfaceSystem, TermFactory, make_surface_system
+from shapespace.variational.surface import SpeciesFactory, SurfaceSystem, TermFactory, make_surface_system
 
 
 @dataclass(frozen=True, eq=False)
 class Recipe:
     """The choices of a model. `ends`: without those of v_phi, which is pinned at both where nothing else is said.
 
-    laws: those of users among the terms, which every scenario's values must admit.
+    species_count: 2 where `species` gives two laws. storages: laws of what is held elastically, of p or sigma. turning: for
+    terms that resist bending, whose viscosity must be > 0. laws: those of users among the terms, which every
+    scenario's values must admit.
     """
 
     parameters: tuple[str, ...]
     terms: TermFactory
     ends: Ends
-    species: Callable[[Any], Species] | None = None
+    species: SpeciesFactory | None = None
+    species_count: int = 1
+    storages: Mapping[str, Callable[[Any], AbstractStorage]] | None = None
+    turning: bool = False
     incompressible: bool = False
     fixed_volume: bool = False
     fixed_area: bool = False
@@ -38,6 +43,9 @@ class Recipe:
             self.terms,
             {**ends, **swirl},
             species=self.species,
+            species_count=self.species_count,
+            storages=self.storages,
+            turning=self.turning,
             incompressible=self.incompressible,
             fixed_volume=self.fixed_volume,
             fixed_area=self.fixed_area,
@@ -52,13 +60,13 @@ class Recipe:
         terms: Callable[[Any], tuple[AbstractTerm, ...]],
         without: tuple[str, ...] = (),
         ends: Ends | None = None,
-        species: Callable[[Any], Species] | None = None,
+        species: SpeciesFactory | None = None,
         laws: tuple[Law, ...] = (),
-        **held: bool,
+        **choices: Any,
     ) -> "Recipe":
         """With more parameters and terms, without the terms of some classes, with other ends or another species law.
 
-        held: other values of incompressible, fixed_volume, fixed_area, ...
+        choices: other values of incompressible, fixed_volume, storages, ...
         """
         base = self.terms
 
@@ -72,5 +80,5 @@ class Recipe:
             ends={**self.ends, **(ends or {})},
             species=species or self.species,
             laws=laws,
-            **held,
+            **choices,
         )

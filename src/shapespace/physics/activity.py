@@ -4,11 +4,12 @@ from abc import abstractmethod
 from typing import ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 
 from shapespace.base.arrays import Traced
-from shapespace.geometry.curve import area_element
-from shapespace.geometry.motion import divergence
+from shapespace.geometry.curve import Geometry, area_element, total_curvature
+from shapespace.geometry.motion import coordinate_flow, divergence
 from shapespace.physics.onsager import LinearLaws, reaction_laws
 from shapespace.physics.tension import tension_power
 from shapespace.physics.term import AbstractTerm, Ledger, Site
@@ -32,6 +33,31 @@ class ActiveTension(AbstractTerm):
     def power(self, site: Site) -> Traced:
         """xi Delta mu(c) div(v) r h."""
         return tension_power(self.tension(site.concentration), site)
+
+
+class ActiveMoment(AbstractTerm):
+    """Power m(c) d(2H)/dt of an active bending moment m = amplitude c/reference: an active spontaneous curvature m/kappa.
+
+    amplitude: [energy/length]; reference: c0. Unlike a spontaneous curvature it does no work when the area changes at the
+    same curvature. Sphere: p = 2 gamma/R + 2 m/R^2.
+
+    As m d(2H)/dt r h = d/dt(m 2H r h) - m 2H div(v) r h with m carried by the matter, and m r dpsi'/dt = -(m r)' dpsi/dt, each
+    up to a flux along the surface that vanishes where psi is held, no gradient of a rate but div(v) is needed.
+    """
+
+    ledger: ClassVar[Ledger] = Ledger.CHEMICAL
+    amplitude: Traced
+    reference: Traced
+
+    def power(self, site: Site) -> Traced:
+        """-m d(2H)/dt r h."""
+        g, w = site.geometry, site.rates
+        m, slope = (self.amplitude / self.reference * value for value in (site.concentration, site.concentration_slope))
+        direction = Geometry(w.r, w.psi, 0.0 * w.psi, w.h, -coordinate_flow(g, w) * g.r)
+        along = -coordinate_flow(g, w) * slope / g.h
+        stored = jax.jvp(lambda x, m: m * total_curvature(x) * area_element(x), (g, m), (direction, along))[1]
+        turned = (slope * g.r + m * g.h * jnp.cos(g.psi)) * w.psi
+        return tension_power(m * total_curvature(g), site) - stored + turned
 
 
 class Reaction(eqx.Module):

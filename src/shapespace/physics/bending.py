@@ -2,6 +2,8 @@
 
 from typing import ClassVar
 
+import jax.numpy as jnp
+
 from shapespace.base.arrays import Traced
 from shapespace.geometry.curve import Geometry, total_curvature
 from shapespace.physics.patch import AbstractProfile
@@ -24,4 +26,30 @@ class HelfrichBending(AbstractEnergy):
 
     def power(self, site: Site) -> Traced:
         """d/dt (f r h) along the motion."""
+        return energy_power(self, site)
+
+
+class InducedBending(AbstractEnergy):
+    """f = (kappa/2) (2H - C0 - coupling c)^2 + E_T c (ln(c/c0) - 1): a dilute species that bends the surface.
+
+    The spontaneous curvature grows by coupling [1/(length concentration)] with c, whose mixing costs E_T = thermal_energy
+    [energy/(length^2 concentration)] (Leibler, J. Phys. 47, 507 (1986)). `physics.species.CurvatureSpecies` has its flux.
+    A sphere yields to l >= 2 where s_l (kappa coupling^2 + E_T/c) = (kappa coupling (l-1)(l+2)/R^2)^2, s_l its stiffness.
+    """
+
+    ledger: ClassVar[Ledger] = Ledger.ENERGY
+    rigidity: Traced
+    spontaneous_curvature: Traced
+    coupling: Traced
+    thermal_energy: Traced
+    reference: Traced
+
+    def density(self, geometry: Geometry, concentration: Traced | float = 0.0) -> Traced:
+        """Energy per area [energy/length^2]."""
+        bend = total_curvature(geometry) - self.spontaneous_curvature - self.coupling * concentration
+        mixing = self.thermal_energy * concentration * (jnp.log(concentration / self.reference) - 1.0)
+        return 0.5 * self.rigidity * bend**2 + mixing
+
+    def power(self, site: Site) -> Traced:
+        """d/dt (f r h) along the motion, which carries the species."""
         return energy_power(self, site)

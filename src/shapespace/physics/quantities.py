@@ -8,7 +8,14 @@ import jax.numpy as jnp
 from shapespace.base.arrays import Traced
 from shapespace.base.scales import Dimension
 from shapespace.geometry.curve import azimuthal_curvature, meridional_curvature, total_curvature
-from shapespace.geometry.motion import axial_velocity, divergence, normal_velocity, strain_rate
+from shapespace.geometry.motion import (
+    axial_velocity,
+    curvature_rate,
+    divergence,
+    normal_velocity,
+    strain_rate,
+    vorticity,
+)
 from shapespace.physics.term import Site
 
 _CURVATURE, _RATE, _VELOCITY = Dimension(-1), Dimension(time=-1), Dimension(1, 0, -1)
@@ -64,6 +71,12 @@ LOCAL_QUANTITIES: dict[str, LocalQuantity] = {
         reason="both principal curvatures are psi'/h",
     ),
     "concentration": LocalQuantity("c", "concentration", Dimension(concentration=1), lambda s: s.concentration),
+    "second_concentration": LocalQuantity(
+        "c_2",
+        "concentration of the second species",
+        Dimension(concentration=1),
+        lambda s: jnp.asarray(s.second_concentration),
+    ),
     "concentration_gradient": LocalQuantity(
         "c'/h",
         "concentration per arc length",
@@ -102,6 +115,26 @@ LOCAL_QUANTITIES: dict[str, LocalQuantity] = {
         True,
         at_pole=lambda s: 0.0 * s.geometry.h,
         reason="v_phi is odd in r, so that v_phi' and v_phi/r cancel",
+    ),
+    "vorticity": LocalQuantity(
+        "n.curl v",
+        "twice the rate of spinning about the normal",
+        _RATE,
+        lambda s: vorticity(s.geometry, s.rates, s.gradients),
+        True,
+        at_pole=lambda s: 2.0 * s.gradients.azimuthal_velocity / s.geometry.h,
+        reason="v_phi is odd in r, so that v_phi' and v_phi/r are alike",
+    ),
+    "curvature_rate": LocalQuantity(
+        "d(2H)/dt",
+        "rate of change of the sum of the curvatures of the matter",
+        Dimension(-1, 0, -1),
+        lambda s: curvature_rate(s.geometry, s.rates, s.gradients),
+        True,
+        at_pole=lambda s: (
+            2.0 * (s.gradients.turning / s.geometry.h - meridional_curvature(s.geometry) * _meridional_strain(s))
+        ),
+        reason="both principal curvatures are alike at a pole, and so are their rates",
     ),
     "divergence": LocalQuantity(
         "div v",

@@ -17,13 +17,19 @@ from shapespace.geometry.motion import Rates, coordinate_flow, divergence
 
 
 class Site(NamedTuple):
-    """Everything known at one point of the surface: shape, rates w, their gradients w' = dw/du, concentration c, c'."""
+    """Everything known at one point of the surface: shape, rates w, their gradients w' = dw/du, concentration c, c'.
+
+    second_concentration: of a second species. bending: the bending moment P_psi/r and its slope, where a flux asks for them.
+    """
 
     geometry: Geometry
     rates: Rates
     gradients: Rates
     concentration: Traced
     concentration_slope: Traced | float = 0.0
+    second_concentration: Traced | float = 0.0
+    bending: Traced | float = 0.0
+    bending_slope: Traced | float = 0.0
 
 
 class Ledger(StrEnum):

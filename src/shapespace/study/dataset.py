@@ -27,7 +27,7 @@ CONVENTIONS = (
     "given and not solved for, flow, pressure and powers are those of the first step; a flat disc, whose flow has no limit "
     "there, is at rest"
 )
-_FLOW_FIELDS = ("tangential_velocity", "normal_velocity")
+_FLOW_FIELDS = ("tangential_velocity", "normal_velocity", "azimuthal_velocity")
 
 
 def make_dataset(scenario: Scenario, frames: Iterable[Frame], outcome: Outcome | None) -> xr.Dataset:
@@ -93,6 +93,7 @@ def _set_in_motion(
     flow = {
         name: np.interp(u, later[0]["mesh_coordinate"], later[0][name]) if later else np.full_like(u, np.nan)
         for name in _FLOW_FIELDS
+        if name in fields[0]
     }
     given = {name: value for name, value in series[0].items() if name not in solved_for}
     solved = {name: after[0][name] for name in solved_for if after and name in after[0]}
@@ -132,8 +133,8 @@ def _fields(engine: Engine, frame: Frame) -> dict[str, Array]:
         "tangential_velocity": y["v"],
         "normal_velocity": np.sin(y["psi"]) * rates[:, 0] + np.cos(y["psi"]) * (rates[:, 1] + v0),
     }
-    if "c" in y:
-        out["concentration"] = y["c"]
+    named = {"c": "concentration", "c_2": "second_concentration", "v_phi": "azimuthal_velocity"}
+    out |= {name: y[field] for field, name in named.items() if field in y}
     if "gamma" in system.algebraic:
         out["local_tension"] = state.algebraic_values(u)[:, 0]
     if "area" in y:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 
 from shapespace.base.arrays import Array
@@ -109,19 +111,32 @@ class Engine:
         """The sphere, flat disc or spheroid at rest, with the initial concentration; multipliers are first guesses."""
         rule, mesh = gauss_rule(self.problem.degree), self.problem.mesh
         stages = mesh[:-1, None] + np.diff(mesh)[:, None] * rule.points
-        functions = (self._disc, self._sphere, self._spheroid)[len(self.system.held)]
-        scalars = functions(mesh)[2]
-        values = self._columns(functions(mesh)[0])
-        slopes = self._columns(functions(stages)[1])
-        algebraic = np.full((*stages.shape, len(self.system.algebraic)), self.values.get("boundary_tension", 0.0))
+        functions = self._sphere if "sphere_radius" in self.values else self._spheroid
+        if "base_radius" in self.values:
+            functions = self._disc
+        known = functions(mesh)[2]
+        scalars = np.array([known.get(name, 0.0) for name in self.system.scalars])
+        values = self._columns(functions(mesh)[0] | self._amounts(mesh, functions(mesh)[0]))
+        slopes = self._columns(functions(stages)[1] | self._amounts(stages, functions(stages)[1], slope=True))
+        tension = self.values.get("boundary_tension", known.get("sigma", 0.0))
+        algebraic = np.full((*stages.shape, len(self.system.algebraic)), tension)
         return state_from_functions(mesh, self.problem.degree, values, slopes, algebraic, scalars)
 
     def _columns(self, functions: dict[str, Array]) -> Array:
         zero = np.zeros_like(functions["r"])
         return np.stack([functions.get(name, zero) for name in self.system.fields], axis=-1)
 
-    def _sphere(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], Array]:
-        """Fields, their slopes, and (h, p, v0) of the resting sphere with the scenario's initial concentration."""
+    def _amounts(self, u: Array, given: dict[str, Array], slope: bool = False) -> dict[str, Array]:
+        """Concentrations, or their slopes, that the shape's own functions do not give: what turnover prefers."""
+        found = {}
+        for name, law in zip(("c", "c_2"), self.system.species_laws(jnp.asarray(self.p)), strict=False):
+            if name not in given:
+                preferred = jnp.vectorize(jax.grad(law.reference) if slope else law.reference)
+                found[name] = np.asarray(preferred(jnp.asarray(u)))
+        return found
+
+    def _sphere(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, float]]:
+        """Fields, their slopes, and h and p of the resting sphere with the scenario's initial concentration."""
         v, radius = self.values, self.values["sphere_radius"]
         angle, width = np.pi * u, v["ring_width"]
         ring = v["initial_ring_amplitude"] * np.exp(-(((u - 0.5) / width) ** 2))
@@ -139,10 +154,10 @@ class Engine:
         slopes |= {"z": -np.pi * radius * np.sin(angle), "psi": np.full_like(u, np.pi), "c": dc}
         c_0 = v["spontaneous_curvature"]
         pressure = 2.0 * tension / radius + v["bending_rigidity"] * c_0 * (c_0 * radius - 2.0) / radius**2
-        return fields, slopes, np.array([np.pi * radius, pressure, 0.0])
+        return fields, slopes, {"h": np.pi * radius, "p": pressure}
 
-    def _spheroid(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], Array]:
-        """Fields, their slopes, and (h, p, sigma, v0): a leaning spheroid at rest, multipliers as near a sphere.
+    def _spheroid(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, float]]:
+        """Fields, their slopes, and h, p and sigma: a leaning spheroid at rest, multipliers as near a sphere.
 
         There the volume yields to l = 2 at p = -2 kappa (6 - C0 R)/R^3 (Ou-Yang and Helfrich, Phys. Rev. Lett. 59, 2486
         (1987)), which sigma = R p/2 - kappa C0 (C0 R - 2)/(2 R) balances.
@@ -159,15 +174,15 @@ class Engine:
         fields |= {"moment": r * kappa * (meridional + azimuthal - c_0), "meridional_force": tension * r}
         # A first guess, like the multipliers: that of even curvature.
         slopes |= {"moment": slopes["r"] * kappa * (2.0 / radius - c_0), "meridional_force": tension * slopes["r"]}
-        return fields, slopes, np.array([h, pressure, tension, 0.0])
+        return fields, slopes, {"h": h, "p": pressure, "sigma": tension}
 
-    def _disc(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], Array]:
-        """Fields, their slopes, and (h,) of the flat disc at the reservoir's tension."""
+    def _disc(self, u: Array) -> tuple[dict[str, Array], dict[str, Array], dict[str, float]]:
+        """Fields, their slopes, and h of the flat disc at the reservoir's tension."""
         radius, tension = self.values["base_radius"], self.values["boundary_tension"]
         fields = {"r": radius * u, "area": 0.5 * (radius * u) ** 2, "meridional_force": tension * radius * u}
         one = np.ones_like(u)
         slopes = {"r": radius * one, "area": radius**2 * u, "meridional_force": tension * radius * one}
-        return fields, slopes, np.array([radius])
+        return fields, slopes, {"h": radius}
 
 
 def state_of(frame: Frame) -> State:

@@ -49,14 +49,14 @@ def define_model(
     ends: Ends | None = None,
     species: Any = None,
     terms: Any = None,
-    **held: bool,
+    **choices: Any,
 ) -> None:
     """Add a model: the shipped one that it is like, with more laws and parameters; or the same again, to change it.
 
     without: classes of the shipped terms to leave out, e.g. "ActiveTension". ends, species: in place of those of the
     shipped model (`variational.ends`, `physics.species`). terms: of the parameters by name, further terms of the package
-    (`physics`). held: incompressible, fixed_volume, fixed_area as in `models.recipe`. ValueError where a law is not admissible
-    (`physics.admission`), InputError where a name is taken or unknown.
+    (`physics`). choices: incompressible, fixed_area, storages, turning, species_count as in `models.recipe`.
+    ValueError where a law is not admissible (`physics.admission`), InputError where a name is taken or unknown.
     """
     parameters = dict(parameters or {})
     laws = _flat(laws)
@@ -87,7 +87,7 @@ def define_model(
     def all_terms(p: Any) -> tuple[AbstractTerm, ...]:
         return (*(law.term(p) for law in laws), *(terms(p) if terms else ()))
 
-    made = recipe.extended(tuple(parameters), all_terms, tuple(without), ends, species, laws=laws, **held)
+    made = recipe.extended(tuple(parameters), all_terms, tuple(without), ends, species, laws=laws, **choices)
     # Conditions and unknowns are counted now, not at the first run.
     made.system()
     for key, one in parameters.items():

@@ -1,5 +1,6 @@
 """Observables of a state, by their contract names, dimensionless."""
 
+import jax.numpy as jnp
 import numpy as np
 
 from shapespace.base.arrays import Array
@@ -43,6 +44,10 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
         **{name: integrals[name] for name in ("area", "bending_energy", "energy")},
         **_powers(engine, integrals, first, last),
     }
+    if system.storages:
+        out["energy"] += system.stored_energy(
+            jnp.asarray(engine.p), {"p": integrals["volume"], "sigma": integrals["area"]}
+        )
     out |= {
         "discretisation_error": discretisation_error(state),
         "boundary_residual": _boundary_residual(engine, x, rate),
@@ -101,9 +106,11 @@ def _regulated(engine: Engine, state: State, column: dict[str, int], integrals: 
     v = engine.values
     c_pole = state.nodes[0, column["c"]]
     position, largest = largest_value(state, column["c"])
-    return {
-        "tension_pole": v["tension"]
-        + v["active_tension"] * c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2),
+    out = {}
+    if "active_tension" in v:
+        hill = c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2)
+        out["tension_pole"] = v["tension"] + v["active_tension"] * hill
+    return out | {
         "max_concentration": largest,
         "ring_position": position,
         **{name: integrals[name] for name in ("chemical_power", "amount", "amount_supply")},

@@ -11,19 +11,23 @@ import jax
 import jax.numpy as jnp
 
 from shapespace.base.arrays import Traced
-from shapespace.geometry.motion import Rates
+from shapespace.geometry.motion import Rates, turning_rate
 from shapespace.physics.term import AbstractTerm, Ledger, Site
 
 
 class Multipliers(NamedTuple):
-    """alpha and beta, the Lagrange multipliers of r' = h cos psi and z' = -h sin psi [energy/length/time per rate]."""
+    """alpha and beta, the Lagrange multipliers of r' = h cos psi and z' = -h sin psi [energy/length/time per rate].
+
+    turning: that of turning = dpsi/dt + q^u psi', where that rate is an unknown.
+    """
 
     radial: Traced
     axial: Traced
+    turning: Traced | float = 0.0
 
 
 class Variation(NamedTuple):
-    """`force` = dR/dw and `flux` = dR/dw', both over the six rates."""
+    """`force` = dR/dw and `flux` = dR/dw', both over the rates."""
 
     force: Rates
     flux: Rates
@@ -43,7 +47,8 @@ def constraint_power(multipliers: Multipliers, site: Site) -> Traced:
     cos, sin = jnp.cos(g.psi), jnp.sin(g.psi)
     radial = dw.r - w.h * cos + g.h * sin * w.psi
     axial = dw.z + w.h * sin + g.h * cos * w.psi
-    return multipliers.radial * radial + multipliers.axial * axial
+    turning = w.turning - turning_rate(g, w)
+    return multipliers.radial * radial + multipliers.axial * axial + multipliers.turning * turning
 
 
 def variation(terms: tuple[AbstractTerm, ...], multipliers: Multipliers, site: Site) -> Variation:

@@ -1,7 +1,7 @@
 """The first-order system of an axisymmetric fluid surface, assembled from terms, species, ends and constraints."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
@@ -10,16 +10,19 @@ import jax.numpy as jnp
 
 from shapespace.base.arrays import Traced
 from shapespace.geometry.curve import Geometry, area_element, tangent_slopes, volume_element
-from shapespace.geometry.motion import Rates, divergence
+from shapespace.geometry.motion import Rates, divergence, turning_rate
 from shapespace.numerics.system import AbstractSystem, Symmetry
 from shapespace.physics.force import Pressure
 from shapespace.physics.species import Species
+from shapespace.physics.storage import AbstractStorage
 from shapespace.physics.tension import FixedArea, Incompressibility
 from shapespace.physics.term import AbstractTerm, Site
 from shapespace.variational.ends import Ends, Free, Pinned, Traction, check_count, check_ends
 from shapespace.variational.rayleighian import Multipliers, Variation, variation
 
 TermFactory = Callable[[Any], tuple[AbstractTerm, ...]]
+SpeciesFactory = Callable[[Any], Species | tuple[Species, ...]]
+SPECIES = ("species", "second_species")
 
 STATE_AND_FLUX = {
     "r": ("r", "alpha"),
@@ -28,12 +31,17 @@ STATE_AND_FLUX = {
     "v": ("v", "meridional_force"),
     "v_phi": ("v_phi", "azimuthal_force"),
     "species": ("c", "species_flux"),
+    "second_species": ("c_2", "second_species_flux"),
+    "turning": ("turning", "turning_moment"),
 }
 """For each rate the field it changes and the flux conjugate to it."""
 
 
 class Held(NamedTuple):
-    """A quantity of the whole surface that is held: the parameter with its value, its element per du, its multiplier's term."""
+    """A quantity of the whole surface that is held: the parameter with its value, its element per du, its multiplier's term.
+
+    Where it stores energy (`physics.storage`) the multiplier sets its value instead.
+    """
 
     parameter: str
     element: Callable[[Geometry], Traced]
@@ -45,7 +53,7 @@ HELD = {
     "sigma": Held("surface_area", lambda g: 2.0 * jnp.pi * area_element(g), FixedArea),
 }
 """By the scalar that is its multiplier."""
-ODD = frozenset({"z", "psi", "alpha", "v", "azimuthal_force", "species_flux", "v0"})
+ODD = frozenset({"z", "psi", "alpha", "v", "azimuthal_force", "species_flux", "second_species_flux", "turning", "v0"})
 """Fields and scalars that change sign when z -> -z and u -> 1 - u; psi goes to pi - psi."""
 
 
@@ -53,9 +61,10 @@ class SurfaceSystem(AbstractSystem):
     """Shape, flow and species of one surface: F = 0 at a point, derived from the Rayleigh density by differentiation.
 
     Fields y: r, z, psi, moment = P_psi, alpha, beta, v = v_u, meridional_force = P_v = r T_uu, then as chosen v_phi and
-    P_phi, c and its flux N, the cumulative area a. Algebraic: gamma_H if incompressible. Scalars: h, then p if the
+    P_phi, c and its flux N, also of a second species, the cumulative area a, and where a term resists bending the rate
+    turning and its flux. Algebraic: gamma_H if incompressible. Scalars: h, then p if the
     volume is fixed, sigma if the total area is, and v0 if the frame moves along. z is measured in that frame. Stored: r, z,
-    psi, h and the amount c r h.
+    psi, h and the amounts c r h. storages: of what is held elastically, the energy law by its multiplier.
     """
 
     fields: tuple[str, ...] = eqx.field(static=True)
@@ -63,7 +72,8 @@ class SurfaceSystem(AbstractSystem):
     scalars: tuple[str, ...] = eqx.field(static=True)
     parameters: tuple[str, ...] = eqx.field(static=True)
     terms: TermFactory = eqx.field(static=True)
-    species: Callable[[Any], Species] | None = eqx.field(static=True)
+    species: SpeciesFactory | None = eqx.field(static=True)
+    storages: tuple[tuple[str, Callable[[Any], AbstractStorage]], ...] = eqx.field(static=True)
     ends: tuple[tuple[str, Any, Any], ...] = eqx.field(static=True)
 
     @property
@@ -110,19 +120,20 @@ class SurfaceSystem(AbstractSystem):
         """(r, z, psi, h[, c r h])."""
         f, h = self.field_values(y), s[self.scalars.index("h")]
         quantities = [f["r"], f["z"], f["psi"], h]
-        if self.species is not None:
-            quantities.append(f["c"] * f["r"] * h)
+        quantities += [f[name] * f["r"] * h for name in ("c", "c_2") if name in f]
         return jnp.stack(quantities)
 
     def site(self, dy: Traced, y: Traced, s: Traced, dq: Traced) -> Site:
         """The state of motion at one point."""
         f, df, scalar = self.field_values(y), self.field_values(dy), self.scalar_values(s)
         zero = jnp.zeros(())
-        rates = Rates(dq[0], dq[1] + scalar.get("v0", zero), dq[2], dq[3], f["v"], f.get("v_phi", zero))
+        rates = Rates(
+            dq[0], dq[1] + scalar.get("v0", zero), dq[2], dq[3], f["v"], f.get("v_phi", zero), f.get("turning", zero)
+        )
         # The density is linear in the gradients of dr/dt, dz/dt, dpsi/dt, dh/dt, so their values do not matter.
-        gradients = Rates(zero, zero, zero, zero, df["v"], df.get("v_phi", zero))
+        gradients = Rates(zero, zero, zero, zero, df["v"], df.get("v_phi", zero), df.get("turning", zero))
         geometry = Geometry(f["r"], f["psi"], df["psi"], scalar["h"], f.get("area", zero))
-        return Site(geometry, rates, gradients, f.get("c", zero), df.get("c", zero))
+        return Site(geometry, rates, gradients, f.get("c", zero), df.get("c", zero), f.get("c_2", zero))
 
     def all_terms(self, a: Traced, s: Traced, p: Traced) -> tuple[AbstractTerm, ...]:
         """The model's terms and those of the constraints, whose multipliers are unknowns."""
@@ -136,7 +147,13 @@ class SurfaceSystem(AbstractSystem):
         """dR/dw and dR/dw' at one point."""
         f = self.field_values(y)
         site = self.site(dy, y, s, dq)
-        return variation(self.all_terms(a, s, p), Multipliers(f["alpha"], f["beta"]), site)
+        terms, multipliers = self.all_terms(a, s, p), Multipliers(f["alpha"], f["beta"])
+        found = variation(terms, multipliers, site)
+        if "turning" in f:
+            # P' = dR/d(turning) + its multiplier gives the multiplier, in which the functional is linear.
+            slope = self.field_values(dy)["turning_moment"]
+            found = variation(terms, multipliers._replace(turning=slope - jnp.asarray(found.force.turning)), site)
+        return found
 
     def equations(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, u: Traced, p: Traced) -> Traced:
         """Geometric relations, P' = dR/dw, definitions of the fluxes, species balance, constraints; one row per unknown."""
@@ -159,17 +176,34 @@ class SurfaceSystem(AbstractSystem):
                 f["azimuthal_force"] - flux.azimuthal_velocity,
                 df["azimuthal_force"] - force.azimuthal_velocity,
             ]
-        if self.species is not None:
-            species = self.species(self.named(p))
-            rows += [
-                f["species_flux"] - species.flux(site, df["c"]),
-                df["species_flux"] + dq[4] - species.source(site, u),
-            ]
+        if "turning" in f:
+            rows += [f["turning_moment"] - flux.turning, f["turning"] - turning_rate(site.geometry, site.rates)]
+        rows += self._species_balances(dy, y, dq, u, p, site)
         if "area" in f:
             rows.append(df["area"] - area_element(site.geometry))
         if self.algebraic:
             rows.append(divergence(site.geometry, site.rates, site.gradients))
         return jnp.stack(rows)
+
+    def species_laws(self, p: Traced) -> tuple[Species, ...]:
+        """The laws of none, one or two species."""
+        if self.species is None:
+            return ()
+        found = self.species(self.named(p))
+        return found if isinstance(found, tuple) else (found,)
+
+    def _species_balances(self, dy: Traced, y: Traced, dq: Traced, u: Traced, p: Traced, site: Site) -> list[Traced]:
+        """Definitions of the fluxes and balances of the amounts; the law of the second species sees the two exchanged."""
+        f, df, rows = self.field_values(y), self.field_values(dy), []
+        moment = f["moment"] / f["r"]
+        slope = (df["moment"] - moment * df["r"]) / f["r"]
+        for i, law in enumerate(self.species_laws(p)):
+            c, flux = STATE_AND_FLUX[SPECIES[i]]
+            own = site._replace(bending=moment, bending_slope=slope)
+            if i == 1:
+                own = own._replace(concentration=f["c_2"], second_concentration=f["c"])
+            rows += [f[flux] - law.flux(own, df[c]), df[flux] + dq[4 + i] - law.source(own, u)]
+        return rows
 
     def _end(self, name: str, end: Any, y: Traced, s: Traced, dq: Traced, p: Traced) -> Traced:
         """The residual of one end condition."""
@@ -204,16 +238,29 @@ class SurfaceSystem(AbstractSystem):
             rows[axial] = jnp.where(self.named(p).friction > 0.0, rows[axial], scalar["v0"])
         if "area" in f0:
             rows.append(f0["area"])
+        # They vanish at the poles as psi is held there; values at nodes follow from those between up to one number.
+        rows += [f0[name] + f1[name] for name in STATE_AND_FLUX["turning"] if name in f0]
         return jnp.stack(rows)
 
     def integrands(self, dy: Traced, y: Traced, a: Traced, s: Traced, u: Traced, p: Traced) -> Traced:
         """The elements of what is held: volume, area."""
-        geometry = self.site(dy, y, s, jnp.zeros(5)).geometry
+        geometry = self.site(dy, y, s, jnp.zeros(6)).geometry
         return jnp.array([HELD[name].element(geometry) for name in self.held])
 
     def targets(self, s: Traced, p: Traced) -> Traced:
         """The values of what is held."""
-        return jnp.array([getattr(self.named(p), HELD[name].parameter) for name in self.held])
+        named, multipliers = self.named(p), self.scalar_values(s)
+        stores = {name: law(named) for name, law in self.storages}
+        return jnp.array(
+            [
+                stores[name].size(multipliers[name]) if name in stores else getattr(named, HELD[name].parameter)
+                for name in self.held
+            ]
+        )
+
+    def stored_energy(self, p: Traced, sizes: Mapping[str, float]) -> float:
+        """Of what is held elastically, at sizes given by their multipliers."""
+        return float(sum(law(self.named(p)).energy(jnp.asarray(sizes[name])) for name, law in self.storages))
 
 
 def make_surface_system(
@@ -221,7 +268,10 @@ def make_surface_system(
     terms: TermFactory,
     ends: Ends,
     *,
-    species: Callable[[Any], Species] | None = None,
+    species: SpeciesFactory | None = None,
+    species_count: int = 1,
+    storages: Mapping[str, Callable[[Any], AbstractStorage]] | None = None,
+    turning: bool = False,
     incompressible: bool = False,
     fixed_volume: bool = False,
     fixed_area: bool = False,
@@ -239,8 +289,14 @@ def make_surface_system(
         fields += ["v_phi", "azimuthal_force"]
         rates.append("v_phi")
     if species is not None:
-        fields += ["c", "species_flux"]
-        rates.append("species")
+        rates += SPECIES[:species_count]
+        fields += [field for name in SPECIES[:species_count] for field in STATE_AND_FLUX[name]]
+    if turning:
+        if not comoving:
+            raise ValueError(
+                "a rate of turning needs a closed surface: at a rim matter passes, whose turning is not known."
+            )
+        fields += STATE_AND_FLUX["turning"]
     if material_area:
         fields.append("area")
     if material_area and not incompressible:
@@ -257,6 +313,7 @@ def make_surface_system(
     if not incompressible and any(isinstance(end, Traction) for pair in ends.values() for end in pair):
         raise ValueError("a Traction end needs an incompressible surface; use Free or Pinned.")
     conditions = [f"{name} at u = {u}" for name in rates for u in (0, 1)] + ["gauge alpha(0) = 0"]
+    conditions += ["turning(0) + turning(1) = 0", "turning_moment(0) + turning_moment(1) = 0"] * turning
     conditions += ["frame z(0) + z(1) = 0"] * comoving + ["area(0) = 0"] * material_area
     check_count(len(fields), scalars, conditions, [HELD[name].parameter for name in multipliers])
     return SurfaceSystem(
@@ -266,5 +323,6 @@ def make_surface_system(
         parameters=parameters,
         terms=terms,
         species=species,
+        storages=tuple((storages or {}).items()),
         ends=tuple((name, *ends[name]) for name in rates),
     )
