@@ -84,4 +84,6 @@ def __getattr__(name: str) -> Any:
     """Public names, loaded on first use: `shapespace --help` should not wait for the array library."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    # What comes through this door shows itself in notebooks.
+    import_module(f"{__name__}.view.notebook")
     return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)

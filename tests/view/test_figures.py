@@ -16,8 +16,10 @@ from matplotlib.transforms import Bbox
 from tests.view.synthetic import FRAMES, MAKERS, dataset_of, dying_flow, guided_division
 
 from shapespace.base.errors import InputError
-from shapespace.view import plot_run, save_movie, style
+from shapespace.view import style
+from shapespace.view.figure import plot_run
 from shapespace.view.frames import progress_measure, read_run, snapshot_frames
+from shapespace.view.movie import save_movie
 from shapespace.view.snapshot import make_camera, make_surface
 
 CURVES = {

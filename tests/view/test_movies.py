@@ -10,7 +10,8 @@ from PIL import Image
 from tests.view.synthetic import dataset_of, dying_flow, membrane_protrusion
 
 from shapespace.base.errors import InputError, StoreError
-from shapespace.view import movie, save_movie, style
+from shapespace.view import movie, style
+from shapespace.view.movie import save_movie
 
 
 def test_movie_arrow_scale_follows_a_dying_flow() -> None:

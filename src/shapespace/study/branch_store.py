@@ -8,6 +8,7 @@ from typing import Any, Protocol, Self, TypeVar
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint, decode_point, encode_point
+from shapespace.study.presenting import Plotted, Summary
 from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import Scenario
 
@@ -86,7 +87,7 @@ class BranchStore(AbstractPathStore[BranchPoint]):
 
 
 @dataclass(frozen=True)
-class Branch:
+class Branch(Plotted):
     """Stationary states of a scenario along a change of one key, or of an observable while a key `free` answers.
 
     points: in the order of the branch, special ones included.
@@ -105,6 +106,24 @@ class Branch:
     def special_points(self) -> tuple[BranchPoint, ...]:
         """Folds, branch points, Hopf points, user points and ends, in the order of the branch."""
         return tuple(point for point in self.points if point.label and point.label != START)
+
+    def summary(self) -> Summary:
+        """Key and range, counts of points and of stable ones, special points, and the diagram."""
+        values = [point.parameter for point in self.points]
+        known = [point.n_unstable for point in self.points if point.is_step and point.n_unstable is not None]
+        facts = {
+            "along": f"{self.key} from {values[0]:.6g} to {values[-1]:.6g}" if values else self.key,
+            "outcome": str(self.outcome or "unfinished"),
+            "points": f"{len(self.points)}, {known.count(0)} of {len(known)} with known growth rates stable",
+            "store": str(self.store or "in memory"),
+        }
+        rows = [("label", self.key, "error", "growing modes before, after")]
+        for point in self.special_points:
+            counts = (point.n_unstable_before, point.n_unstable_after)
+            told = "" if None in counts else f"{counts[0]}, {counts[1]}"
+            rows.append((point.label, f"{point.parameter:.8g}", f"{point.parameter_error:.1g}", told))
+        title = f"Branch of {self.scenario.name} in {self.key}"
+        return Summary(title, facts, {"special points": rows}, is_drawn=len(values) > 1)
 
     @property
     def began(self) -> str:

@@ -13,6 +13,7 @@ from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START, AbstractPathStore
 from shapespace.study.frame import Array, Frame, Layout
+from shapespace.study.presenting import Plotted, Summary
 from shapespace.study.scenario import Scenario
 
 PIECES = 16
@@ -112,7 +113,7 @@ class CurveStore(AbstractPathStore[CurvePoint]):
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(Plotted):
     """Folds or branch points of a scenario along a change of two keys, in the order of the curve, special ones included.
 
     of: fold, pitchfork, transcritical or branch-point. detail: of a curve that could not be begun, why.
@@ -130,6 +131,19 @@ class Curve:
     def special_points(self) -> tuple[CurvePoint, ...]:
         """Cusps and other special points, user points and ends, in the order of the curve."""
         return tuple(point for point in self.points if point.label and point.label != START)
+
+    def summary(self) -> Summary:
+        """Keys, special points, and the plane."""
+        facts = {
+            "of": f"{self.of} in the plane of {' and '.join(self.keys)}",
+            "outcome": str(self.outcome or "unfinished"),
+            "points": str(len(self.points)),
+            "store": str(self.store or "in memory"),
+        }
+        rows: list[tuple[str, ...]] = [("label", *self.keys)]
+        rows += [(point.label, *(f"{value:.8g}" for value in point.parameters)) for point in self.special_points]
+        title = f"Curve of {self.scenario.name}"
+        return Summary(title, facts, {"special points": rows}, is_drawn=len(self.points) > 1)
 
     @property
     def missed(self) -> tuple[dict[str, Any], ...]:

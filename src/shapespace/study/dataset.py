@@ -72,6 +72,12 @@ def profile_of(scenario: Scenario, frame: Frame) -> dict[str, Array]:
     return {name: values * scenario.scales.factor(name) for name, values in fields.items()}
 
 
+def meridian_of(scenario: Scenario, frame: Frame) -> tuple[Array, Array]:
+    """Radius and axial position (point,) of one frame."""
+    profile = profile_of(scenario, frame)
+    return profile["radius"], profile["axial_position"]
+
+
 def open_dataset(path: str | Path) -> xr.Dataset:
     """The dataset of a stored run, finished or not. StoreError where there is none, or nothing in it yet."""
     store = RunStore.open(path)

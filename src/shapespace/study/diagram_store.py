@@ -26,6 +26,7 @@ from shapespace.study.curve_store import Curve, open_curve
 from shapespace.study.files import storage
 from shapespace.study.frame import Array, read_arrays, write_arrays
 from shapespace.study.grid import Axis, Grid
+from shapespace.study.presenting import Plotted, Summary
 from shapespace.study.records import AbstractRecordStore, holds_store
 from shapespace.study.regimes import Regime
 from shapespace.study.scenario import Scenario
@@ -259,7 +260,7 @@ def _short(value: Any) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagram:
+class Diagram(Plotted):
     """A map of stationary states, as far as it is computed. store: its directory, which is a Zarr store."""
 
     scenario: Scenario
@@ -270,6 +271,16 @@ class Diagram:
     def dataset(self) -> xr.Dataset:
         """Dimensions named as the two keys (and `state` where several are asked), a variable for each observable."""
         return xr.open_zarr(self.store).load()
+
+    def summary(self) -> Summary:
+        """Axes, how many points have a state, and the map."""
+        facts = {
+            "axes": ", ".join(str(axis) for axis in (self.request.grid.x, self.request.grid.y)),
+            "states": ", ".join(self.request.states),
+            "points": f"{self.points}, {self.converged} with a state, {len(self.failed)} without",
+            "store": str(self.store),
+        }
+        return Summary(f"Diagram of {self.scenario.name}", facts, is_drawn=self.converged > 0)
 
     @property
     def points(self) -> int:

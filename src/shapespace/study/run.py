@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.frame import Frame
+from shapespace.study.presenting import AbstractAnimation, Plotted, Summary, quantities_table, the_presenter
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import Start, find_start
@@ -28,7 +29,7 @@ _FINAL = {Outcome.STATIONARY, Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING}
 
 
 @dataclass(frozen=True)
-class Run:
+class Run(Plotted):
     """How a run ended and what it left. `steps` counts from the initial state, `wall_time` is in seconds of this call.
 
     `observables` are those of the last frame, in the scenario's units. `frames` are there only for a run without store.
@@ -51,6 +52,23 @@ class Run:
         if self.store is None:
             return make_dataset(self.scenario, self.frames, self.outcome)
         return open_dataset(self.store)
+
+    def summary(self) -> Summary:
+        """Scenario, outcome, time, observables, and the last state's outline."""
+        from shapespace.study.dataset import meridian_of
+
+        facts = {
+            "outcome": f"{self.outcome}: {self.outcome.advice}",
+            "time": f"{self.observables['time']:.6g}",
+            "steps": f"{self.steps}, {self.wall_time:.1f} s",
+            "store": str(self.store or "in memory"),
+        }
+        tables = {"observables at the end": quantities_table(self.scenario.scales, self.observables)}
+        return Summary(f"Run of {self.scenario.name}", facts, tables, meridian_of(self.scenario, self.state().frame))
+
+    def animate(self, seconds: float = 8.0) -> AbstractAnimation:
+        """The movie, as `shapespace.movie` makes it, for a notebook to play or to save."""
+        return the_presenter().animation(self, seconds)
 
     def state(self, number: int = -1) -> Start:
         """A frame, the last one by default, for another run or a stationary state to start from."""

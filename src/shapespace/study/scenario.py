@@ -30,6 +30,7 @@ from shapespace.study.parameters import (
     shown,
 )
 from shapespace.study.plugins import load_installed
+from shapespace.study.presenting import Presented, Summary, quantities_table
 
 # What a resumed run may change: how far it goes, not what it computes.
 FREE_ON_RESUME = ("until", "max_steps")
@@ -40,7 +41,7 @@ TEMPLATES: dict[str, str] = {}
 _SECTIONS = ("parameters", "initial", "run", "numerics")
 
 
-class Scenario(Record):
+class Scenario(Record, Presented):
     """One run, fully stated. Make it with `scenario`, `load_scenario` or `Scenario.from_keys`.
 
     `given` holds the keys as they were written, twins included: a scenario that states `peclet` keeps its Peclet number
@@ -86,6 +87,16 @@ class Scenario(Record):
         if not overrides:
             return self
         return type(self).from_keys(self.name, self.model, replace_keys(dict(self.given), overrides, self.model))
+
+    def summary(self) -> Summary:
+        """Model and keys with values, by section."""
+        sections = self.sections()
+        sections["parameters"] |= self.twins()
+        return Summary(
+            f"Scenario {self.name}",
+            {"model": self.model},
+            {section: quantities_table(self.scales, values) for section, values in sections.items()},
+        )
 
     @property
     def kind(self) -> str:

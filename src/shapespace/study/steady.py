@@ -25,6 +25,7 @@ from shapespace.study.keyed import KeyedProblem
 from shapespace.study.modes import Modes
 from shapespace.study.observables import energy_law, measure, shape_end
 from shapespace.study.paths import MAX_POINTS, NEWTON, StateName, along, read_state_name, steps
+from shapespace.study.presenting import Presented, Summary, quantities_table
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
 from shapespace.study.starts import Start, find_start
@@ -63,7 +64,7 @@ class Rates:
 
 
 @dataclass(frozen=True)
-class Steady:
+class Steady(Presented):
     """A stationary state of a scenario, or why there is none: `found.outcome`, with the best state met.
 
     detail: in words, what a search for a named state met.
@@ -90,6 +91,17 @@ class Steady:
     def observables(self) -> dict[str, float]:
         """By their contract names, in the scenario's units."""
         return observables_at(self.scenario, self.problem.base, self.found.x)
+
+    def summary(self) -> Summary:
+        """How the search ended, observables, and the outline."""
+        from shapespace.study.dataset import meridian_of
+
+        facts = {"outcome": f"{self.outcome}: {self.outcome.advice}"}
+        if not self.outcome.is_success:
+            return Summary(f"No stationary state of {self.scenario.name}", facts | {"reached": self.nearest})
+        tables = {"observables": quantities_table(self.scenario.scales, self.observables)}
+        meridian = meridian_of(self.scenario, self.frame)
+        return Summary(f"Stationary state of {self.scenario.name}", facts, tables, meridian)
 
     def spectrum(self, count: int = 6) -> Spectrum:
         """Leading growth rates and modes, dimensionless."""

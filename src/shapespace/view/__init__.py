@@ -1,6 +1,1 @@
-"""Pictures of stored runs: figures and movies. Reads datasets, never solves."""
-
-from shapespace.view.figure import plot_run
-from shapespace.view.movie import save_movie
-
-__all__ = ["plot_run", "save_movie"]
+"""Pictures, movies, meshes and pages of what is stored. Reads datasets, never solves."""

@@ -48,13 +48,15 @@ _OPENED: dict[str, Callable[[str | Path], Branch | Curve | Diagram]] = {
 }
 
 
-def _figure(source: Source | Branch | Curve | Diagram) -> Figure:
+def _figure(source: Source | Branch | Curve | Diagram, observable: str | None) -> Figure:
     if isinstance(source, str | Path) and (noun := noun_of(source)) in _OPENED:
         source = _OPENED[noun](source)
     if isinstance(source, Branch):
-        return plot_branch(source)
+        return plot_branch(source, observable)
     if isinstance(source, Diagram):
-        return plot_diagram(source)
+        return plot_diagram(source, observable)
+    if observable is not None:
+        raise InputError(f"observable = {observable!r}: is for the figure of a branch or a diagram; leave it away.")
     return plot_curve(source) if isinstance(source, Curve) else plot_run(_dataset_of(source))
 
 
@@ -62,12 +64,14 @@ def plot(
     source: Source | Branch | Curve | Diagram,
     out: str | Path | None = None,
     *,
+    observable: str | None = None,
     mode: int | None = None,
     budget: bool = False,
 ) -> Figure:
     """The figure of a run, a branch, a curve or a diagram, stored or not; also written to `out` (.png, .pdf, .svg) if given.
 
-    mode: number of a mode of a stored state to draw instead, `source` being `DIR:LABEL` of a branch or `DIR` of a state.
+    observable: of a branch, what to draw against the key; of a diagram, what to map. mode: number of a mode of a stored state to
+    draw instead, `source` being `DIR:LABEL` of a branch or `DIR` of a state.
     budget: of a run or a state, what goes into energy and heat and what supplies it.
     """
     if budget:
@@ -75,7 +79,7 @@ def plot(
             raise InputError("budget = True: is for the figure of a run or of a stored state; leave it away.")
         figure = plot_budget(_dataset_of(source))
     elif mode is None:
-        figure = _figure(source)
+        figure = _figure(source, observable)
     elif isinstance(source, str | Path):
         figure = plot_mode(find_modes(str(source)), mode)
     else:

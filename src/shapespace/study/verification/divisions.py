@@ -28,7 +28,7 @@ def folds() -> Iterator[Row]:
 def neck() -> Iterator[Row]:
     """Fig. 6: the divided state, again on another mesh and of another degree; the amount that flows in balances what decays."""
     usual, finer = (found_state(steady(scenario("guided-division", **keys))) for keys in ({}, FINER))
-    source = "the same with degree 5, 80 elements, 10 000 times the accuracy"
+    source = "the same with degree 5, 80 elements"
     for key, tolerance in (("neck_radius", 1e-6), ("pressure", 1e-6), ("height", 1e-6)):
         yield Row(key.replace("_", " "), usual.observables[key], finer.observables[key], source, tolerance)
 
