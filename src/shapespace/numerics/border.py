@@ -2,37 +2,46 @@
 
 import numpy as np
 
-from shapespace.base.arrays import Array
-from shapespace.base.problem import Border
+from shapespace.numerics.small_lu import compiled
 
 
-def with_border(
-    border: Border, widths: Array, weights: Array, n: int, points: Array, ends: Array, targets: Array
-) -> list[Array]:
+@compiled
+def with_border(columns, rows, corner, widths, weights, n, points, ends, targets):  # type: ignore[no-untyped-def]
     """The blocks (points, ends, targets, jumps, nodes) of the bordered system, as `condensation.factorise` takes them.
 
-    border.columns (m_b, size): flat as residuals (equations (N, k, m), continuity (N, n), ends, integrals); border.rows
-    (m_b, size): flat as states (nodes (N + 1, n), slopes (N, k, n), algebraic (N, k, n_a), scalars).
+    columns (m_b, size): flat as residuals (equations (N, k, m), continuity (N, n), ends, integrals); rows (m_b, size): flat
+    as states (nodes (N + 1, n), slopes (N, k, n), algebraic (N, k, n_a), scalars); corner (m_b, m_b).
     """
     n_rows, n_columns, k, elements = points.shape
-    (n_i, n_s), extra = targets.shape, len(border.corner)
+    (n_i, n_s), (n_b, end_columns), extra = targets.shape, ends.shape, corner.shape[0]
     m = n_rows - n_i
-    equations, continuity, at_ends, integrals = np.split(
-        border.columns, np.cumsum([elements * k * m, elements * n, len(ends)]), axis=1
-    )
-    nodes, slopes, algebraic, scalars = np.split(
-        border.rows, np.cumsum([(elements + 1) * n, elements * k * n, elements * k * (m - n)]), axis=1
-    )
-    # Integral rows are sums over points with these weights.
-    shares = widths[:, None] * weights
+    slopes, algebraic, scalars = (elements + 1) * n, (elements + 1 + elements * k) * n, elements * (k * m + n) + n
+    continuity, at_ends, integrals = elements * k * m, elements * (k * m + n), elements * (k * m + n) + n_b
     wide = np.zeros((n_rows + extra, n_columns + extra, k, elements))
     wide[:n_rows, :n_columns] = points
-    wide[:m, n_columns:] = equations.reshape(extra, elements, k, m).transpose(3, 0, 2, 1)
-    wide[n_rows:, :n] = (slopes.reshape(extra, elements, k, n) / shares[..., None]).transpose(0, 3, 2, 1)
-    wide[n_rows:, n:m] = (algebraic.reshape(extra, elements, k, m - n) / shares[..., None]).transpose(0, 3, 2, 1)
-    jumps = np.zeros((elements, n, n_s + extra))
-    jumps[..., n_s:] = continuity.reshape(extra, elements, n).transpose(1, 2, 0)
-    node_rows = np.zeros((elements + 1, n_i + extra, n))
-    node_rows[:, n_i:] = nodes.reshape(extra, elements + 1, n).transpose(1, 0, 2)
-    corner = np.block([[targets, -integrals.T], [-scalars, -border.corner]])
-    return [wide, np.concatenate([ends, at_ends.T], axis=1), corner, jumps, node_rows]
+    jumps, nodes = np.zeros((elements, n, n_s + extra)), np.zeros((elements + 1, n_i + extra, n))
+    wide_ends, wide_targets = np.empty((n_b, end_columns + extra)), np.empty((n_i + extra, n_s + extra))
+    wide_ends[:, :end_columns], wide_targets[:n_i, :n_s] = ends, targets
+    for b in range(extra):
+        column, row = columns[b], rows[b]
+        for j in range(k):
+            for e in range(elements):
+                # Integral rows are sums over points with these weights.
+                point, share = e * k + j, widths[e] * weights[j]
+                for c in range(m):
+                    wide[c, n_columns + b, j, e] = column[point * m + c]
+                for c in range(n):
+                    wide[n_rows + b, c, j, e] = row[slopes + point * n + c] / share
+                for c in range(m - n):
+                    wide[n_rows + b, n + c, j, e] = row[algebraic + point * (m - n) + c] / share
+        for e in range(elements):
+            for c in range(n):
+                jumps[e, c, n_s + b] = column[continuity + e * n + c]
+        for e in range(elements + 1):
+            for c in range(n):
+                nodes[e, n_i + b, c] = row[e * n + c]
+        wide_ends[:, end_columns + b] = column[at_ends:integrals]
+        wide_targets[:n_i, n_s + b] = -column[integrals:]
+        wide_targets[n_i + b, :n_s] = -row[scalars:]
+        wide_targets[n_i + b, n_s:] = -corner[b]
+    return wide, wide_ends, wide_targets, jumps, nodes

@@ -192,10 +192,13 @@ class CollocationProblem(AbstractSmoothProblem):
     ) -> tuple[Array, CollocationLinearisation]:
         """Residual and factorised Jacobian. A border's columns become scalars, its rows integral conditions."""
         residual, points, ends, targets = self.blocks(x, p, rate)
-        rule, extra = gauss_rule(self.degree), []
+        rule, extra = gauss_rule(self.degree), ()
         if border is not None:
+            columns, rows, corner = (
+                np.ascontiguousarray(part) for part in (border.columns, border.rows, border.corner)
+            )
             points, ends, targets, *extra = with_border(
-                border, self._widths, rule.weights, self.n, points, ends, targets
+                columns, rows, corner, self._widths, rule.weights, self.n, points, ends, targets
             )
         factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *extra)
         return residual, CollocationLinearisation(self, factors)
