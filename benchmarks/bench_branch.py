@@ -2,8 +2,8 @@
 
 Both start from the sphere on 60 elements of 4 Gauss points with the mesh moved along, and locate the folds. Ours locates
 the branch points too; AUTO looks for none (peer_auto.py says why). Then ours with the leading growth rates at every point,
-which AUTO does not offer for boundary value problems, 100 points of Bratu's problem, and 40 points of the fold curve of Chan's
-problem with its cusp.
+which AUTO does not offer for boundary value problems, 100 points of Bratu's problem beside PyCont-Lite, and 40 points of the
+fold curve of Chan's problem with its cusp.
 
 Times are processor time on one core, everything compiled, the better of two.
 Run from the root: python -m benchmarks.bench_branch   (about two minutes)
@@ -20,6 +20,7 @@ use_one_core()
 import time
 
 import numpy as np
+from benchmarks import peer_pycont
 from benchmarks.peer_auto import MISSING, STEPS, auto_directory, run_auto
 
 from shapespace.analysis.bifurcation import Kind, SingularPoint
@@ -182,6 +183,19 @@ def print_auto(ours: Branch, seconds: float) -> None:
         print(f"    end: relative differences of (Delta_c, h, p) {np.abs(np.array(run.end) / mine - 1.0)}")
 
 
+def print_pycont(points: int, seconds: float) -> None:
+    """Print what PyCont-Lite does on Bratu's problem, or that it is not here."""
+    run = peer_pycont.run_pycont(points // 2, 0.3)
+    if run is None:
+        print(peer_pycont.MISSING)
+        return
+    print(line(f"PyCont-Lite, {peer_pycont.CELLS} cells", run.points, run.seconds))
+    ratio = (points / seconds) / (run.points / run.seconds)
+    print(
+        f"    fold {run.fold:.12f}, error {abs(run.fold - BRATU_FOLD):.0e}; points per second, ours to its: {ratio:.0f}"
+    )
+
+
 def main() -> None:
     """Print the table."""
     print(machine())
@@ -191,6 +205,7 @@ def main() -> None:
     ((fold, error),) = made.folds
     print(line("Bratu, 20 elements", len(made.points), seconds))
     print(f"    fold {fold:.12f}, estimated error {error:.0e}, error {abs(fold - BRATU_FOLD):.0e}")
+    print_pycont(len(made.points), seconds)
     curve, seconds = timed(partial(fold_curve, chan_fold()))
     (cusp,) = (one for one in curve if isinstance(one, Special))
     print(line("fold curve of Chan, 20 elements", len(curve) - 1, seconds))
