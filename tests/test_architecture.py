@@ -43,7 +43,7 @@ ALLOWED: dict[str, frozenset[str]] = {
     "app": frozenset({"base", "study", "view"}),
     # The front doors: public names re-exported, those for models of one's own, and `python -m shapespace`.
     "__init__": frozenset({*MECHANICS, "analysis", "study", "view"}),
-    "modelling": frozenset({"physics", "study"}),
+    "modelling": frozenset({"physics", "study", "variational"}),
     "__main__": frozenset({"cli"}),
 }
 

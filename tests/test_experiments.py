@@ -29,12 +29,14 @@ def full_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("full")
 
 
+@pytest.mark.usefixtures("own_models")
 @pytest.mark.parametrize("name", NAMES)
 def test_quick(name: str, quick_out: Path):
     assert_holds(name, quick_out, quick=True)
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("own_models")
 @pytest.mark.parametrize("name", NAMES)
 def test_full(name: str, full_out: Path):
     assert_holds(name, full_out, quick=False)

@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from shapespace.models import vesicle
+from shapespace.models import open_membrane, vesicle
+from shapespace.physics.storage import AreaElasticity
 from shapespace.variational.ends import Free, Pinned, check_count, check_ends
 
 
@@ -26,5 +27,7 @@ def test_rates_without_ends_and_ends_without_rates_are_named():
 
 
 def test_two_terms_that_fix_the_same_field_are_named():
-    with pytest.raises(ValueError, match="incompressible and fixed_area both fix the area"):
-        replace(vesicle.RECIPE, incompressible=True).system()
+    with pytest.raises(ValueError, match="incompressible and fixed_area both fix the area of an open surface"):
+        replace(open_membrane.RECIPE, fixed_area=True).system()
+    with pytest.raises(ValueError, match="sigma is no multiplier of this surface, which has p, dilation"):
+        replace(vesicle.RECIPE, incompressible=True, storages={"sigma": AreaElasticity}).system()

@@ -59,8 +59,9 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
         out |= _closed(state, column, integrals, scalars)
         out |= _regulated(engine, state, column, integrals) if "c" in column else {}
         out |= dict.fromkeys(("tension", "tension_pole"), scalars["sigma"]) if "sigma" in scalars else {}
-    else:
+    if "gamma" in system.algebraic:
         out["tension_pole"] = float(state.algebraic_values(np.array([0.0]))[0, 0])
+    if "p" not in scalars:
         out["pulling_force"] = integrals["pulling_force"]
         out["pulling_force_per_2pi"] = integrals["pulling_force"] / (2.0 * np.pi)
     return {name: float(value) for name, value in out.items()}

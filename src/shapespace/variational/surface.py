@@ -45,16 +45,19 @@ class Held(NamedTuple):
 
     parameter: str
     element: Callable[[Geometry], Traced]
-    term: Callable[[Traced], AbstractTerm]
+    term: Callable[[Traced], AbstractTerm] | None
 
 
 HELD = {
     "p": Held("enclosed_volume", volume_element, Pressure),
     "sigma": Held("surface_area", lambda g: 2.0 * jnp.pi * area_element(g), FixedArea),
+    "dilation": Held("surface_area", lambda g: 2.0 * jnp.pi * area_element(g), None),
 }
-"""By the scalar that is its multiplier."""
-ODD = frozenset({"z", "psi", "alpha", "v", "azimuthal_force", "species_flux", "second_species_flux", "turning", "v0"})
-"""Fields and scalars that change sign when z -> -z and u -> 1 - u; psi goes to pi - psi."""
+"""By the scalar that is its multiplier. An incompressible surface whose total area is held dilates evenly, at a rate that is
+zero but for the error of time steps: without it nothing would say what the area of a surface at rest is."""
+ODD = frozenset({"z", "psi", "alpha", "v", "v_phi", "species_flux", "second_species_flux", "turning", "v0"})
+"""Fields and scalars that change sign when the surface is turned upside down by half a turn about a horizontal axis: z -> -z and
+u -> 1 - u; psi goes to pi - psi. Unlike a mirror that keeps a torque about the normal, which chiral matter has."""
 
 
 class SurfaceSystem(AbstractSystem):
@@ -62,9 +65,9 @@ class SurfaceSystem(AbstractSystem):
 
     Fields y: r, z, psi, moment = P_psi, alpha, beta, v = v_u, meridional_force = P_v = r T_uu, then as chosen v_phi and
     P_phi, c and its flux N, also of a second species, the cumulative area a, and where a term resists bending the rate
-    turning and its flux. Algebraic: gamma_H if incompressible. Scalars: h, then p if the
-    volume is fixed, sigma if the total area is, and v0 if the frame moves along. z is measured in that frame. Stored: r, z,
-    psi, h and the amounts c r h. storages: of what is held elastically, the energy law by its multiplier.
+    turning and its flux. Algebraic: gamma_H if incompressible. Scalars: h, then p if the volume is fixed, sigma (or dilation) if
+    the total area is, and v0 if the frame moves along. z is measured in that frame. Stored: r, z, psi, h and the amounts c r h.
+    storages: of what is held elastically, the energy law by its multiplier.
     """
 
     fields: tuple[str, ...] = eqx.field(static=True)
@@ -78,7 +81,7 @@ class SurfaceSystem(AbstractSystem):
 
     @property
     def symmetry(self) -> Symmetry | None:
-        """Closed surfaces: the mirror z -> -z, which exchanges the poles, where both have conditions of the same kind.
+        """Closed surfaces: half a turn, z -> -z, which exchanges the poles, where both have conditions of the same kind.
 
         The density R is even. So of a field with sign s, its rate has s, its slope -s, and the flux P_w = dR/dw' conjugate to
         it again -s, as the species flux has. The gauge alpha(0) = alpha(1) is its own image.
@@ -138,7 +141,7 @@ class SurfaceSystem(AbstractSystem):
     def all_terms(self, a: Traced, s: Traced, p: Traced) -> tuple[AbstractTerm, ...]:
         """The model's terms and those of the constraints, whose multipliers are unknowns."""
         scalar = self.scalar_values(s)
-        terms = (*self.terms(self.named(p)), *(HELD[name].term(scalar[name]) for name in self.held))
+        terms = (*self.terms(self.named(p)), *(term(scalar[name]) for name in self.held if (term := HELD[name].term)))
         if self.algebraic:
             terms = (*terms, Incompressibility(a[0]))
         return terms
@@ -182,7 +185,8 @@ class SurfaceSystem(AbstractSystem):
         if "area" in f:
             rows.append(df["area"] - area_element(site.geometry))
         if self.algebraic:
-            rows.append(divergence(site.geometry, site.rates, site.gradients))
+            dilation = self.scalar_values(s).get("dilation", jnp.zeros(()))
+            rows.append(divergence(site.geometry, site.rates, site.gradients) - dilation)
         return jnp.stack(rows)
 
     def species_laws(self, p: Traced) -> tuple[Species, ...]:
@@ -303,11 +307,17 @@ def make_surface_system(
         raise ValueError(
             "material_area needs an incompressible surface: only there is the cumulative area a material label."
         )
-    if incompressible and fixed_area:
+    if incompressible and fixed_area and not comoving:
         raise ValueError(
-            "incompressible and fixed_area both fix the area, so that neither tension has a value: keep one of them."
+            "incompressible and fixed_area both fix the area of an open surface, so that neither tension has a value: keep one."
         )
-    multipliers = ["p"] * fixed_volume + ["sigma"] * fixed_area
+    multipliers = ["p"] * fixed_volume + ["dilation" if incompressible else "sigma"] * fixed_area
+    astray = [name for name in storages or {} if name not in multipliers]
+    if astray:
+        raise ValueError(
+            f"storages: {astray[0]} is no multiplier of this surface, which has {', '.join(multipliers) or 'none'}; an "
+            "elastic area needs fixed_area and a surface that is not incompressible, an elastic volume fixed_volume."
+        )
     scalars = ("h", *multipliers, *(["v0"] if comoving else []))
     check_ends(ends, tuple(rates))
     if not incompressible and any(isinstance(end, Traction) for pair in ends.values() for end in pair):
