@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from shapespace.study.search_store import Search as Search
     from shapespace.study.search_store import open_search as open_search
     from shapespace.study.searching import search_states as search_states
+    from shapespace.study.starts import find_start as find_start
     from shapespace.study.steady import Steady as Steady
     from shapespace.study.steady import steady as steady
     from shapespace.study.tables import stored_dataset as stored_dataset
@@ -66,6 +67,7 @@ _HOMES = {
     "Search": "study.search_store",
     "open_search": "study.search_store",
     "search_states": "study.searching",
+    "find_start": "study.starts",
     "Steady": "study.steady",
     "steady": "study.steady",
     "verify": "study.verification.table",

@@ -118,9 +118,9 @@ class Browser:
         )
 
     def open(
-        self, address: str, ready: str = "document.body?.dataset.busy === 'false' && document.readyState === 'complete'"
+        self, address: str, ready: str = "document.body?.dataset.busy === 'false' && document.body.dataset.stage"
     ) -> None:
-        """Go to an address and wait until the page has settled."""
+        """Go to an address and wait until the page has settled, the surface drawn."""
         # A change after the hash alone would not load the page again.
         self.send("Page.navigate", url="about:blank")
         self.wait("location.href === 'about:blank'")
@@ -159,6 +159,18 @@ class Browser:
     def move(self, x: float, y: float) -> None:
         """Move the pointer."""
         self.send("Input.dispatchMouseEvent", type="mouseMoved", x=x, y=y)
+
+    def choose(self, selector: str, value: object) -> None:
+        """Set the value of a field, as its user would."""
+        self.run(
+            f"(() => {{ const e = document.querySelector({json.dumps(selector)}); e.value = {json.dumps(str(value))};"
+            "for (const kind of ['input', 'change']) e.dispatchEvent(new Event(kind, {bubbles: true})); })()"
+        )
+
+    def all(self, selector: str, what: str) -> list[Any]:
+        """Of all elements, what an expression in `e` says of each."""
+        script = f"JSON.stringify([...document.querySelectorAll({json.dumps(selector)})].map((e) => {what}))"
+        return list(json.loads(self.run(script)))
 
     def press(self, key: str, text: str = "") -> None:
         """Press and release a key."""

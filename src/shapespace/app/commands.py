@@ -5,12 +5,10 @@ import shlex
 from collections.abc import Collection
 from typing import Any
 
-from shapespace.study.keys import MODELS
+from shapespace.study.keys import MAIN_KEYS, MODELS
 from shapespace.study.plugins import VARIABLE
 from shapespace.study.scenario import Scenario, scenario, scenario_names
 
-MAIN_KEYS = {"closed-surface": "peclet", "open-membrane": "spontaneous_curvature", "vesicle": "reduced_volume"}
-"""By kind of model, the key that a branch is proposed in where none was varied."""
 _CROSSINGS = ("pitchfork", "transcritical", "branch-point")
 FURTHER = 1.25
 """How far a proposed branch goes, relative to the value that it starts at."""

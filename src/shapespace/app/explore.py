@@ -2,7 +2,8 @@
 
 import secrets
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -79,29 +80,18 @@ def export(stores: Sequence[str | Path], file: str | Path, progress: Callable[[i
         raise InputError(f"{file}: is not named as a page; end it in .html.")
     catalogue = Catalogue([Path(one) for one in stores])
     answers: dict[str, Any] = {question("stores"): catalogue.stores()}
-    asked = [*_questions(catalogue)]
-    count = sum(name == "state" for name, _ in asked)
+    sources = [catalogue.source(number) for number in range(len(stores))]
+    count = sum(sum(1 for _ in source.places()) for source in sources)
     if count > MOST_STATES:
         raise InputError(f"{file}: {count} states are too many for one file, at most {MOST_STATES}; give fewer stores.")
     done = 0
-    for name, about in asked:
-        answers[question(name, **about)] = catalogue.answer(name, {key: str(value) for key, value in about.items()})
-        if name == "state":
-            done += 1
-            if progress is not None:
+    for number, source in enumerate(sources):
+        for name, about in chain([("overview", {})], source.questions()):
+            asked = {"store": str(number), **about}
+            answers[question(name, **asked)] = catalogue.answer(name, asked)
+            done += name == "state"
+            if name == "state" and progress is not None:
                 progress(done, count)
     with storage(file):
         write_atomically(file, single_file(answers))
     return file
-
-
-def _questions(catalogue: Catalogue) -> Iterator[tuple[str, dict[str, Any]]]:
-    """All that the page may ask about the stores without computing anything."""
-    for number in range(len(catalogue.paths)):
-        source = catalogue.source(number)
-        yield "overview", {"store": number}
-        for place in source.places():
-            yield "state", {"store": number, "place": place}
-            modes = source.modes(place)
-            for index in range(len(modes.modes)) if modes is not None else ():
-                yield "mode", {"store": number, "place": place, "index": index}

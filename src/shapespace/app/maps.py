@@ -1,5 +1,6 @@
 """Diagrams for the page: one map at a time, the numbers at a point, and its shape, which is computed again."""
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,8 @@ from shapespace.study.telling import most_telling
 if TYPE_CHECKING:
     from shapespace.study.diagram_state import DiagramStates
 
+MOST_SHAPES, MOST_POINTS = 400, 40_000
+"""In one file: shapes of each diagram, which are computed for it, and points with their numbers."""
 IS_STATE = CODES[Outcome.CONVERGED]
 
 
@@ -57,6 +60,7 @@ class DiagramSource(AbstractSource):
                 "y": {"key": request.grid.y.key, "values": exact(request.grid.y.values)},
                 "states": list(request.states),
                 "names": names,
+                "strides": self._strides(),
                 "of": most_telling(scenario.kind, change),
                 "outcomes": codes(outcomes),
                 "boundaries": [_boundary(curve) for curve in Diagram(scenario, request, self.path).boundaries],
@@ -96,8 +100,32 @@ class DiagramSource(AbstractSource):
         }
 
     def places(self) -> Iterator[str]:
-        outcomes = self._values(self._group(), OUTCOME)
-        return (f"{s},{i},{j}" for s, j, i in np.argwhere(outcomes == IS_STATE))
+        i, j = self._strides()
+        outcomes = self._values(self._group(), OUTCOME)[:, ::j, ::i]
+        return (f"{s},{i * x},{j * y}" for s, y, x in np.argwhere(outcomes == IS_STATE))
+
+    def questions(self) -> Iterator[tuple[str, dict[str, str]]]:
+        store = self.store()
+        points = len(store.request.states) * int(np.prod(store.request.grid.shape))
+        if points > MOST_POINTS:
+            raise InputError(f"{self.path}: its {points} points are too many for one file, at most {MOST_POINTS}.")
+        for name in _arrays(self._group()):
+            yield "values", {"name": name}
+        for place in self.places():
+            yield "state", {"place": place}
+            try:
+                self._states().state(self._place(place))
+            except StoreError:
+                # Not found again: the page says that it is not in the file.
+                continue
+            yield "shape", {"place": place}
+
+    def _strides(self) -> tuple[int, int]:
+        """Every how many points along x and y a file has a shape."""
+        store = self.store()
+        wanted = math.sqrt(MOST_SHAPES / len(store.request.states))
+        i, j = (math.ceil(count / wanted) for count in store.request.grid.shape)
+        return i, j
 
     def shape(self, place: str) -> dict[str, Any]:
         """Everything about a state that must be computed again: its profiles, and how to go on from it."""

@@ -36,7 +36,7 @@ def kind_of(name: str) -> str:
     return next(kind for ending, kind in KINDS.items() if name.endswith(ending)) + "; charset=utf-8"
 
 
-def question(name: str, **asked: Any) -> str:
+def question(name: str, /, **asked: Any) -> str:
     """A question as the page asks it: what it is known by in a file."""
     return f"{name}?{urlencode(asked)}" if asked else name
 

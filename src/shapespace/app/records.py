@@ -1,6 +1,5 @@
 """Stores whose states are records one after another: runs, branches, curves and searches."""
 
-from abc import abstractmethod
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -80,9 +79,6 @@ class AbstractRecords(AbstractSource, Generic[R]):
     def modes(self, place: str) -> Modes | None:
         return None
 
-    @abstractmethod
-    def content(self) -> dict[str, Any]: ...
-
 
 def table(
     columns: dict[str, Any], x: str, y: str, places: Sequence[int], *, line: bool = True, **more: Any
@@ -117,9 +113,7 @@ class RunSource(AbstractRecords[Frame]):
     def content(self) -> dict[str, Any]:
         at, frames = self.store().scenario, self.records()
         columns = columns_of([{"time": frame.time, **frame.observables} for frame in frames])
-        return table(columns, "time", _telling(at, columns, ["time"]), range(len(frames))) | {
-            "ranges": {"time": [frames[0].time, frames[-1].time] if frames else [0.0, 0.0]}
-        }
+        return table(columns, "time", _telling(at, columns, ["time"]), range(len(frames)))
 
     def state(self, place: str) -> dict[str, Any]:
         frame, store = self.record(place), self.store()
@@ -215,6 +209,10 @@ class BranchSource(AbstractRecords[BranchPoint]):
             unstable=point.n_unstable,
             can_compute=not len(point.modes) and free is None,
         )
+
+    def stored_rates(self, place: str) -> Array | None:
+        point = self.record(place)
+        return point.growth_rates if len(point.growth_rates) else None
 
     def modes(self, place: str) -> Modes | None:
         point = self.record(place)
@@ -340,6 +338,10 @@ class SearchSource(AbstractRecords[Tried]):
             unstable=one.n_unstable,
             can_compute=True,
         )
+
+    def stored_rates(self, place: str) -> Array | None:
+        one = self.record(place)
+        return one.growth_rates if len(one.growth_rates) else None
 
     def resting(self, place: str) -> tuple[Scenario, Frame]:
         one = self.record(place)

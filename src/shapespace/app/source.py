@@ -43,7 +43,7 @@ class AbstractSource(ABC):
 
     @abstractmethod
     def places(self) -> Iterator[str]:
-        """Places of all states."""
+        """Places of all states; of very many, of those that a file has."""
 
     @abstractmethod
     def state(self, place: str) -> dict[str, Any]:
@@ -56,6 +56,14 @@ class AbstractSource(ABC):
     @abstractmethod
     def resting(self, place: str) -> tuple[Scenario, Frame]:
         """A state at rest whose modes may be computed. InputError where it does not rest, or rests under a control."""
+
+    def questions(self) -> Iterator[tuple[str, dict[str, str]]]:
+        """Questions that a file of this store must answer, beside the overview: of every state, and its stored modes."""
+        for place in self.places():
+            yield "state", {"place": place}
+            modes = self.modes(place)
+            for index in range(len(modes.modes)) if modes is not None else ():
+                yield "mode", {"place": place, "index": str(index)}
 
     def overview(self) -> dict[str, Any]:
         """What the store holds and how it came about."""
@@ -83,7 +91,18 @@ class AbstractSource(ABC):
 
     def mode(self, place: str, index: int) -> dict[str, Any]:
         """The mode of a growth rate, by the number that it has in the state's own list."""
-        return mode_of(self._modes(place), index)
+        modes, stored = self._modes(place), self.stored_rates(place)
+        if not 0 <= index < len(modes.growth_rates if stored is None else stored):
+            raise InputError(f"mode {index}: there is none; choose a growth rate of this state.")
+        nearest = index
+        if stored is not None:
+            # Modes that were computed again may come in another order.
+            nearest = int(np.argmin(np.linalg.norm(modes.growth_rates - stored[index], axis=1)))
+        return mode_of(modes, nearest) | {"index": index}
+
+    def stored_rates(self, place: str) -> Array | None:
+        """Growth rates (m, 2) that are stored with a state, None where none are."""
+        return None
 
     def _modes(self, place: str) -> Modes:
         stored = self.modes(place)
@@ -137,8 +156,6 @@ def rates_of(modes: Any) -> dict[str, Any]:
 
 def mode_of(modes: Modes, index: int) -> dict[str, Any]:
     """A mode's profiles, in units of the length and the concentration that its size 1 stands for."""
-    if not 0 <= index < len(modes.modes):
-        raise InputError(f"mode {index}: there is none; choose one of 0 to {len(modes.modes) - 1}.")
     found = modes.profiles(index, POINTS)
     unit = modes.scenario.scales.factor("length")
     parts: dict[str, Array] = {"u": found.u}

@@ -37,7 +37,14 @@ def explore(
         if not path.is_dir():
             raise InputError(f"{path}: is not a directory that holds results; give one that `shapespace` made.")
     if export is not None:
-        print(write(stores, export))
+        from rich.console import Console
+        from rich.progress import Progress
+
+        console = Console(stderr=True)
+        with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
+            task = bar.add_task("reading states", total=None)
+            written = write(stores, export, lambda done, total: bar.update(task, completed=done, total=total))
+        print(written)
         return
     explorer = Explorer(stores, port)
     print(explorer.address, flush=True)

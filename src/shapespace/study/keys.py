@@ -29,6 +29,9 @@ from shapespace.study.parameters import (
     shown,
 )
 
+MAIN_KEYS = {"closed-surface": "peclet", "open-membrane": "spontaneous_curvature", "vesicle": "reduced_volume"}
+"""By kind of model, the key of a problem that need not vary any, and in which a branch is proposed."""
+
 Value = float | int | bool
 Keys = Mapping[str, Value]
 Formula = Callable[[Mapping[str, float]], float]

@@ -22,6 +22,7 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, frame_of, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
+from shapespace.study.keys import MAIN_KEYS
 from shapespace.study.modes import Modes
 from shapespace.study.observables import energy_law, measure, shape_end
 from shapespace.study.paths import MAX_POINTS, NEWTON, StateName, along, read_state_name, steps
@@ -30,9 +31,6 @@ from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
 from shapespace.study.starts import Start, find_start
 from shapespace.study.vesicles import solve_vesicle
-
-MAIN_KEYS = {"closed-surface": "peclet", "open-membrane": "spontaneous_curvature", "vesicle": "reduced_volume"}
-"""By model, the key of a problem that need not vary any."""
 
 
 @dataclass(frozen=True)

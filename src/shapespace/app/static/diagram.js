@@ -7,7 +7,7 @@ import { session } from "./session.js";
 import { limits, make } from "./svg.js";
 import { hideTip, showTip } from "./tip.js";
 import { view } from "./view.js";
-import { html, number, plain } from "./words.js";
+import { escaped, html, number, safe } from "./words.js";
 
 const REACH = 40;
 const MARKS = {
@@ -26,8 +26,8 @@ export class Diagram extends Chart {
     host.addEventListener("pointermove", (event) => this.hover(event));
     host.addEventListener("pointerleave", () => this.leave());
     host.addEventListener("click", (event) => {
-      const i = this.nearest(event);
-      if (this.table && i !== null) session.choose(this.table.places[i]);
+      const i = this.table && this.x ? this.nearest(event) : null;
+      if (i !== null) session.choose(this.table.places[i]);
     });
     session.on("state", () => this.table && this.mark());
     view.on(["x", "y"], () => this.table && this.arrange());
@@ -146,8 +146,8 @@ export class Diagram extends Chart {
     const { x, y } = this.names;
     const { columns, labels, unstable } = this.table;
     this.pointer.append(make("circle", { class: "near", cx: this.x(columns[x][i]), cy: this.y(columns[y][i]), r: 8 }));
-    const told = [x, y].map((name) => `${plain(name)} ${number(columns[name][i])} ${html(unit(name))}`);
-    const head = labels?.[i] ? `<b>${labels[i]}</b><br>` : "";
+    const told = [x, y].map((name) => `${safe(name)} ${number(columns[name][i])} ${html(unit(name))}`);
+    const head = labels?.[i] ? `<b>${escaped(labels[i])}</b><br>` : "";
     showTip(event, `${head}${told.join("<br>")}${unstable ? `<br>${stabilityWords(unstable[i])}` : ""}`);
   }
 

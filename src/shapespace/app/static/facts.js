@@ -2,7 +2,7 @@
 
 import { stabilityWords } from "./diagram.js";
 import { session } from "./session.js";
-import { escaped, html, number, plain } from "./words.js";
+import { escaped, html, number, safe } from "./words.js";
 
 export function showFacts(host) {
   const { state } = session;
@@ -11,14 +11,14 @@ export function showFacts(host) {
     return;
   }
   const { observables, parameters = {}, missing } = state;
-  const told = Object.entries(parameters).map(([name, value]) => `<span>${plain(name)} <b data-name="${name}" data-value="${value}" style="font-size:13px">${number(value, 7)}</b></span>`);
-  const time = state.time === undefined ? "" : `<span>time <b data-name="time" data-value="${state.time}" style="font-size:13px">${number(state.time)}</b> ${unitOf("time")}</span>`;
+  const told = Object.entries(parameters).map(([name, value]) => `<span>${safe(name)} <b data-name="${escaped(name)}" data-value="${Number(value)}" style="font-size:13px">${number(value, 7)}</b></span>`);
+  const time = state.time === undefined ? "" : `<span>time <b data-name="time" data-value="${Number(state.time)}" style="font-size:13px">${number(state.time)}</b> ${unitOf("time")}</span>`;
   const head = `<p class="title"><b>${escaped(state.title)}</b>${badge(state)}${time}${told.join("")}</p>`;
   const none = missing ? `<p>${escaped(missing[0].replaceAll("-", " "))}. ${escaped(missing[1])}</p>` : "";
   const rows = Object.entries(observables).filter(([name]) => name !== "time").map(([name, value]) => {
     const { symbol, meaning } = session.quantity(name);
-    return `<div title="${escaped(meaning)}"><dt>${plain(name)} <i>${html(symbol)}</i></dt>`
-      + `<dd data-name="${name}" data-value="${value}">${number(value)} <small>${unitOf(name)}</small></dd></div>`;
+    return `<div title="${escaped(meaning)}"><dt>${safe(name)} <i>${html(symbol)}</i></dt>`
+      + `<dd data-name="${escaped(name)}" data-value="${Number(value)}">${number(value)} <small>${unitOf(name)}</small></dd></div>`;
   });
   host.innerHTML = `${head}${none}<dl>${rows.join("")}</dl>`;
 }

@@ -6,11 +6,11 @@ import { gradient, MAPS, row, scaleFor, table } from "./colours.js";
 import { recall } from "./data.js";
 import { stabilityWords } from "./diagram.js";
 import { place as placeLabels } from "./labels.js";
-import { session } from "./session.js";
+import { placeOf, session } from "./session.js";
 import { make } from "./svg.js";
 import { hideTip, showTip } from "./tip.js";
 import { view } from "./view.js";
-import { html, number, plain } from "./words.js";
+import { html, number, safe } from "./words.js";
 
 const IS_STATE = 1;
 const NOT_COMPUTED = 0;
@@ -21,12 +21,13 @@ export class Heatmap extends Chart {
     Object.assign(this, { tools, legend });
     this.canvas = document.createElement("canvas");
     this.canvas.hidden = true;
+    this.svg.classList.add("map");
     host.prepend(this.canvas);
     host.addEventListener("pointermove", (event) => this.hover(event));
     host.addEventListener("pointerleave", () => this.leave());
     host.addEventListener("click", (event) => {
-      const at = this.map && this.point(event);
-      if (at) session.choose([this.layer, ...at].join(","));
+      const at = this.map && this.x ? this.point(event) : null;
+      if (at) session.choose(placeOf(this.map, this.layer, ...at));
     });
     session.on("state", () => this.map && this.mark());
     session.on("closed", () => { this.canvas.hidden = true; this.values = null; });
@@ -66,7 +67,7 @@ export class Heatmap extends Chart {
   changeState(state) {
     view.set({ state });
     const [, i, j] = view.get("place").split(",");
-    if (j !== undefined) session.choose([state, i, j].join(","));
+    if (j !== undefined) session.choose(placeOf(this.map, state, i, j));
   }
 
   draw(width, height) {
@@ -128,7 +129,7 @@ export class Heatmap extends Chart {
   describe(scale, codes) {
     const { symbol, unit } = session.quantity(this.name);
     const bar = document.createElement("span");
-    bar.innerHTML = `<b>${plain(this.name)} ${html(symbol)}</b> <b>${number(scale.low, 4)}</b>`
+    bar.innerHTML = `<b>${safe(this.name)} ${html(symbol)}</b> <b>${number(scale.low, 4)}</b>`
       + `<i class="bar" style="background:${gradient(scale)}"></i><b>${number(scale.high, 4)} ${unit === "1" ? "" : html(unit)}</b>`;
     this.legend.replaceChildren(bar);
     if (codes.some((code) => code !== IS_STATE && code !== NOT_COMPUTED)) {
@@ -196,8 +197,8 @@ export class Heatmap extends Chart {
     const isCount = this.name === "n_unstable";
     const value = outcomes[k] !== IS_STATE ? `<b>${meanings[outcomes[k]]?.[0] ?? "not computed"}</b>`
       : isCount ? `<b>${stabilityWords(Number.isFinite(this.values[k]) ? this.values[k] : null)}</b>`
-      : `<b>${plain(this.name)} ${number(this.values[k])}</b> ${unit === "1" ? "" : html(unit)}`;
-    showTip(event, `${value}<br>${plain(x.key)} ${number(x.values[i])}<br>${plain(y.key)} ${number(y.values[j])}`);
+      : `<b>${safe(this.name)} ${number(this.values[k])}</b> ${unit === "1" ? "" : html(unit)}`;
+    showTip(event, `${value}<br>${safe(x.key)} ${number(x.values[i])}<br>${safe(y.key)} ${number(y.values[j])}`);
   }
 
   leave() {

@@ -1,7 +1,8 @@
 // Everything by keyboard.
 
+import { isFile } from "./data.js";
 import { copyLink, copyPython, showCommands, showHelp } from "./dialogs.js";
-import { session } from "./session.js";
+import { placeOf, session } from "./session.js";
 import { view } from "./view.js";
 
 /** Keys with what they do. */
@@ -47,7 +48,8 @@ function step(across, up) {
   if (map) {
     const [state, i, j] = session.state.place.split(",").map(Number);
     const held = (value, count) => Math.max(0, Math.min(count - 1, value));
-    session.choose([state, held(i + across, map.x.values.length), held(j + up, map.y.values.length)].join(","));
+    const [far, high] = isFile ? map.strides : [1, 1];
+    session.choose(placeOf(map, state, held(i + far * across, map.x.values.length), held(j + high * up, map.y.values.length)));
   } else if (session.state) {
     const i = places.indexOf(session.state.place) + across;
     if (i >= 0 && i < places.length) session.choose(places[i]);

@@ -81,6 +81,13 @@ element("theme").addEventListener("click", changeTheme);
 element("help").addEventListener("click", () => showHelp(keys));
 
 showTheme();
-await stage.start();
-showTheme();
-await session.open();
+// Numbers and lines are there while the library that draws the surface still loads.
+const first = new Promise((done) => {
+  session.on("overview", done);
+  session.on("trouble", () => session.trouble && done());
+});
+const opening = session.open();
+await first;
+await new Promise((done) => requestAnimationFrame(() => setTimeout(done)));
+await stage.start(isDark);
+await opening;

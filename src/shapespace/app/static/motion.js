@@ -3,7 +3,7 @@
 const SWING = 0.12;
 const TINTED = 0.3;
 const PERIOD = 2600;
-const ROUND_OFF = 1e-7;
+const ROUND_OFF = 1e-5;
 
 /** The meridian of a state and its fields; with a mode, displaced along it. phase: angle of the swing. */
 export function momentOf(state, mode, phase) {
@@ -20,6 +20,12 @@ export function momentOf(state, mode, phase) {
   const z = base.z.map((value, i) => value + shift * push[i] * Math.cos(base.angle[i]));
   const moved = tint && fields.concentration ? { ...fields, concentration: fields.concentration.map((value, i) => value + shade * tint[i]) } : fields;
   return { ...base, r, z, fields: moved, still: base };
+}
+
+/** What a mode changes, in words. */
+export function wordsOf(state, mode) {
+  const { shift, shade } = amplitudes(state, mode);
+  return shift && shade ? "" : shift ? ", of the shape alone" : ", of the concentration alone";
 }
 
 /** Displacement and change of concentration, each drawn large enough to be seen; a part that is round-off stays away. */

@@ -6,9 +6,11 @@ import { session } from "./session.js";
 import { limits, linear, make, tick, ticks, title } from "./svg.js";
 import { hideTip, showTip } from "./tip.js";
 import { view } from "./view.js";
-import { html, number, plain } from "./words.js";
+import { html, number, safe } from "./words.js";
 
 const SECOND = { concentration: "tangential_velocity", local_spontaneous_curvature: "meridional_curvature" };
+
+const ROUND_OFF = 1e-9;
 
 export class Profiles extends Chart {
   constructor(host, tools, pointed) {
@@ -69,7 +71,7 @@ export class Profiles extends Chart {
     const { first, second } = this;
     const told = session.quantity(first);
     const layer = this.axes({
-      width, height, x: [0, 1], y: limits(fields[first], 0.08), right: second ? 34 : 0, left: 44,
+      width, height, x: [0, 1], y: profileLimits(fields[first]), right: second ? 34 : 0, left: 44,
       xTitle: { name: "", symbol: "u", unit: "1" }, yTitle: { name: "", symbol: told.symbol, unit: told.unit },
     });
     if (second) this.drawSecond(layer, u, fields[second], session.quantity(second));
@@ -79,7 +81,7 @@ export class Profiles extends Chart {
   }
 
   drawSecond(layer, u, values, { symbol, unit }) {
-    const scale = linear(limits(values, 0.08), [this.box.bottom, this.box.top]);
+    const scale = linear(profileLimits(values), [this.box.bottom, this.box.top]);
     const marks = ticks(scale.domain, Math.min(5, (this.box.bottom - this.box.top) / 40));
     for (const value of marks) {
       this.overlay.append(make("text", { x: this.box.right + 6, y: scale(value) + 4, class: "warm" }, tick(value, marks[1] - marks[0] || 1)));
@@ -105,7 +107,7 @@ export class Profiles extends Chart {
     const { u, fields } = this.moment;
     const lines = [this.first, this.second].filter(Boolean).map((name) => {
       const { unit } = session.quantity(name);
-      return `${plain(name)} <b>${number(fields[name][i], 5)}</b> ${unit === "1" ? "" : html(unit)}`;
+      return `${safe(name)} <b>${number(fields[name][i], 5)}</b> ${unit === "1" ? "" : html(unit)}`;
     });
     return [`u = ${number(u[i], 4)}`, ...lines].join("<br>");
   }
@@ -115,4 +117,9 @@ export class Profiles extends Chart {
     const at = i === null ? null : this.x(this.moment.u[i]);
     this.line.replaceChildren(...(i === null ? [] : [make("line", { class: "cross", x1: at, x2: at, y1: this.box.top, y2: this.box.bottom })]));
   }
+}
+
+/** Limits around a field; one that is nothing but round-off is drawn flat. */
+function profileLimits(values) {
+  return values.every((value) => Math.abs(value) < ROUND_OFF) ? [-1, 1] : limits(values, 0.08);
 }

@@ -1,6 +1,6 @@
 // What is open now: the overview of a store, the chosen state, its mode; told to whoever draws it.
 
-import { ask, forget, recall } from "./data.js";
+import { ask, forget, isFile, recall } from "./data.js";
 import { view } from "./view.js";
 
 export const session = new (class extends EventTarget {
@@ -9,7 +9,7 @@ export const session = new (class extends EventTarget {
   state = null;
   mode = null;
   trouble = "";
-  waiting = "";
+  doing = [];
   asked = 0;
   wanted = "";
 
@@ -33,11 +33,10 @@ export const session = new (class extends EventTarget {
   }
 
   async open() {
-    await this.attempt("reading the store", async () => {
+    await Promise.all([this.openStore(), this.attempt("", async () => {
       this.stores = (await ask("stores")).stores;
       this.tell("stores");
-      await this.openStore();
-    });
+    })]);
   }
 
   async openStore() {
@@ -113,25 +112,40 @@ export const session = new (class extends EventTarget {
     this.tell("mode");
   }
 
-  /** Do something that may fail, and say so. */
+  /** Do something that may fail, and say so until something else is tried. Words say what is waited for. */
   async attempt(words, act, failed) {
-    this.waiting = words;
-    document.body.dataset.busy = "true";
-    this.tell("waiting");
+    if (!this.doing.length) this.trouble = "";
+    const one = { words };
+    this.doing.push(one);
+    this.report();
     try {
       await act();
-      this.trouble = "";
     } catch (error) {
       this.trouble = error.message;
       failed?.();
     } finally {
-      this.waiting = "";
-      document.body.dataset.busy = "false";
-      this.tell("waiting");
-      this.tell("trouble");
+      this.doing.splice(this.doing.indexOf(one), 1);
+      this.report();
     }
   }
+
+  get waiting() {
+    return this.doing.map(({ words }) => words).filter(Boolean).at(-1) ?? "";
+  }
+
+  report() {
+    document.body.dataset.busy = String(this.doing.length > 0);
+    this.tell("waiting");
+    this.tell("trouble");
+  }
 })();
+
+/** The place of a point of a map; in a file, of the nearest one that has its shape there. */
+export function placeOf(map, state, i, j) {
+  const [across, up] = isFile ? map.strides : [1, 1];
+  const near = (value, stride, count) => stride * Math.min(Math.round(value / stride), Math.floor((count - 1) / stride));
+  return [state, near(i, across, map.x.values.length), near(j, up, map.y.values.length)].join(",");
+}
 
 /** The state to show first: the end of a run, the first label of a branch, the middle of a map. */
 function firstPlace(overview) {
@@ -146,7 +160,7 @@ function firstPlace(overview) {
     }
     if (!found.length) return "0,0,0";
     const [, i, j] = found.reduce((best, one) => (one[0] < best[0] ? one : best));
-    return `0,${i},${j}`;
+    return placeOf(overview.map, 0, i, j);
   }
   const { places, labels } = overview.table;
   if (overview.noun === "run") return places.at(-1) ?? "";

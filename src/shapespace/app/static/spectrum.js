@@ -1,14 +1,20 @@
 // Growth rates of small perturbations in the complex plane; a click sets the surface swinging along a mode.
 
 import { Chart } from "./chart.js";
+import { isFile } from "./data.js";
 import { session } from "./session.js";
 import { limits, make } from "./svg.js";
 import { hideTip, showTip } from "./tip.js";
-import { html, number } from "./words.js";
+import { escaped, html, number } from "./words.js";
+
+const REACH = 18;
 
 export class Spectrum extends Chart {
   constructor(host) {
     super(host, "Growth rates in the complex plane");
+    host.addEventListener("click", (event) => this.choose(this.nearest(event)));
+    host.addEventListener("pointermove", (event) => this.hover(event));
+    host.addEventListener("pointerleave", hideTip);
     session.on("state", () => this.due());
     session.on("mode", () => this.due());
     session.on("waiting", () => this.due());
@@ -39,7 +45,7 @@ export class Spectrum extends Chart {
     values.forEach((rate, i) => layer.append(this.dot(rate, i, rates)));
   }
 
-  dot([re, im], i, { errors, parities, neutral }) {
+  dot([re, im], i, { errors, neutral }) {
     const kind = i in neutral ? "neutral" : re > 0 ? "growing" : "";
     const chosen = session.mode?.index === i ? " chosen" : "";
     const [px, py] = [this.x(re), this.y(im)];
@@ -47,18 +53,44 @@ export class Spectrum extends Chart {
     const dot = make("g", { class: `rate ${kind}${chosen}`, tabindex: 0, role: "button", "aria-label": words, "data-index": i, "data-real": re, "data-imaginary": im });
     const width = this.x(re + (errors[i] ?? 0)) - px;
     if (width > 3) dot.append(make("line", { class: "error", x1: px - width, x2: px + width, y1: py, y2: py }));
-    dot.append(make("circle", { r: 13, cx: px, cy: py, fill: "transparent" }), make("circle", { class: "dot", r: 5.5, cx: px, cy: py }));
-    const chooseMode = () => (session.mode?.index === i ? session.stopMode() : session.animate(i));
-    dot.addEventListener("click", chooseMode);
+    dot.append(make("circle", { class: "dot", r: 5.5, cx: px, cy: py }));
     dot.addEventListener("keydown", (event) => {
       if (event.key !== "Enter" && event.key !== " ") return;
       event.preventDefault();
       event.stopPropagation();
-      chooseMode();
+      this.choose(i);
     });
-    dot.addEventListener("pointermove", (event) => showTip(event, `<b>${words}</b><br>${[parities[i], i in neutral ? `neutral: ${neutral[i]}` : ""].filter(Boolean).join(", ")}<br>click: swing along this mode`));
-    dot.addEventListener("pointerleave", hideTip);
     return dot;
+  }
+
+  choose(i) {
+    if (i === null) return;
+    if (session.mode?.index === i) session.stopMode();
+    else session.animate(i);
+  }
+
+  /** The growth rate next to the pointer, as they often lie close together. */
+  nearest(event) {
+    const values = this.x ? session.state?.rates?.values ?? [] : [];
+    const box = this.host.getBoundingClientRect();
+    const [px, py] = [event.clientX - box.left, event.clientY - box.top];
+    let [best, least] = [null, REACH];
+    values.forEach(([re, im], i) => {
+      const distance = Math.hypot(this.x(re) - px, this.y(im) - py);
+      if (distance < least) [best, least] = [i, distance];
+    });
+    return best;
+  }
+
+  hover(event) {
+    const i = this.nearest(event);
+    if (i === null) {
+      hideTip();
+      return;
+    }
+    const { parities, neutral } = session.state.rates;
+    const kinds = [parities[i], i in neutral ? `neutral: ${neutral[i]}` : ""].filter(Boolean).map(escaped).join(", ");
+    showTip(event, `<b>${this.words(i)}</b>${kinds ? `<br>${kinds}` : ""}<br>click: swing along mode ${i + 1}`);
   }
 
   words(i) {
@@ -77,6 +109,10 @@ export class Spectrum extends Chart {
     }
     if (!session.state.can_compute) {
       this.say(session.overview.noun === "run" ? "This surface moves: growth rates belong to states at rest." : "Not known for this state.");
+      return;
+    }
+    if (isFile) {
+      this.say("Not in this file.");
       return;
     }
     const button = document.createElement("button");

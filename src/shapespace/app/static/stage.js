@@ -2,12 +2,12 @@
 
 import { choice, toggle } from "./choices.js";
 import { gradient, MAPS, scaleFor } from "./colours.js";
-import { momentOf, Swing } from "./motion.js";
+import { momentOf, Swing, wordsOf } from "./motion.js";
 import { Outline } from "./outline.js";
 import { Profiles } from "./profiles.js";
 import { session } from "./session.js";
 import { view } from "./view.js";
-import { html, number, plain } from "./words.js";
+import { escaped, html, number, safe } from "./words.js";
 
 const EXCESS = 1.25;
 const SHARE = 0.99;
@@ -27,19 +27,23 @@ export class Stage {
     });
     session.on("state", () => this.changed());
     session.on("mode", () => this.changed());
-    session.on("waiting", () => this.wait());
+    for (const name of ["waiting", "mode"]) session.on(name, () => this.wait());
     view.on(["colour", "colours", "arrows"], () => this.changed());
     view.on(["camera"], () => this.surface && view.get("camera") === "" && this.surface.orbit.home());
   }
 
   /** Three dimensions where the browser has them; the outline alone where it has not. */
-  async start() {
+  async start(isDark) {
     try {
       const { Surface } = await import("./surface.js");
       this.surface = new Surface(this.host, (camera) => view.set({ camera }));
       this.surface.orbit.read(view.get("camera"));
+      this.surface.setTheme(isDark());
+      if (session.state) this.changed();
+      document.body.dataset.stage = "ready";
     } catch (error) {
-      this.host.innerHTML = `<div class="empty">This browser draws nothing in three dimensions (${error.message}); the outline below shows the shape.</div>`;
+      document.body.dataset.stage = "missing";
+      this.host.innerHTML = `<div class="empty">This browser draws nothing in three dimensions (${escaped(error.message)}); the outline below shows the shape.</div>`;
     }
   }
 
@@ -137,7 +141,7 @@ export class Stage {
     const units = unit === "1" ? "" : html(unit);
     const speed = session.quantity("tangential_velocity").unit;
     const arrows = fastest ? `<span>longest arrow ${number(fastest, 3)} ${speed === "1" ? "" : html(speed)}</span>` : "";
-    const text = `${arrows}<span>${plain(colour)} ${html(symbol)}${units ? ` (${units})` : ""}</span>`
+    const text = `${arrows}<span>${safe(colour)} ${html(symbol)}${units ? ` (${units})` : ""}</span>`
       + `<span class="bar" style="background:${gradient(span)}"></span>`
       + `<span class="ends"><span>${number(span.low, 3)}</span><span>${span.isBeyond ? "over " : ""}${number(span.high, 3)}</span></span>`;
     if (text !== this.described) this.scale.innerHTML = text;
@@ -146,7 +150,7 @@ export class Stage {
 
   wait() {
     const { mode } = session;
-    const swinging = mode ? `swinging along mode ${mode.index + 1}, drawn large; Esc stops` : "";
+    const swinging = mode && session.state?.fields ? `swinging along mode ${mode.index + 1}${wordsOf(session.state, mode)}, drawn large; Esc stops` : "";
     this.note.textContent = session.waiting || swinging;
     this.note.classList.toggle("waiting", session.waiting !== "");
     this.note.hidden = this.note.textContent === "";

@@ -51,4 +51,9 @@ export function plain(name) {
   return name.replaceAll("_", " ");
 }
 
+/** A name as HTML: names come from stores, which may come from anywhere. */
+export function safe(name) {
+  return escaped(plain(name));
+}
+
 export const unitless = (unit) => !unit || unit === "1";

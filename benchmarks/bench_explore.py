@@ -1,0 +1,85 @@
+"""The explorer in Chromium on a map of 500 x 500 points, a branch and a run: how long until it shows, how long a click takes.
+
+The map is made of spheres, written by the store's own writer, so that only reading and showing it is measured; its shapes are
+computed again at each click, as the store has numbers only. Times are wall-clock, on two cores with Chromium drawing in software.
+Run from the root: python -m benchmarks.bench_explore [COUNT]   (COUNT x COUNT points, 500 without; needs Chromium; a minute)
+"""
+
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from benchmarks.timing import machine
+from tests.app.browser import PROGRAM, Browser, chromium
+from tests.app.stores import make_branch, make_map, make_run
+
+CLICKS = 20
+SHOWN = "!!document.querySelector('#diagram svg .here')"
+SHAPE = "!!document.querySelector('#outline .shape') && document.body.dataset.busy === 'false'"
+CLICK = """(async () => {
+  const host = document.getElementById('diagram'), box = host.getBoundingClientRect();
+  const told = () => [...document.querySelectorAll('#facts .title [data-value]')].map((e) => e.dataset.value).join();
+  const frame = () => new Promise((done) => requestAnimationFrame(done));
+  const before = told(), began = performance.now();
+  const at = { clientX: box.left + %f * box.width, clientY: box.top + %f * box.height, bubbles: true };
+  host.dispatchEvent(new MouseEvent('click', at));
+  while (told() === before && performance.now() - began < 5000) await frame();
+  const numbers = performance.now() - began;
+  while (document.body.dataset.busy === 'true') await frame();
+  await frame();
+  return told() === before ? null : [numbers, performance.now() - began];
+})()"""
+
+
+def main() -> None:
+    """Print the table."""
+    count = int(sys.argv[1]) if len(sys.argv) > 1 else 500
+    if PROGRAM is None:
+        sys.exit("needs Chromium")
+    print(machine())
+    with tempfile.TemporaryDirectory() as folder, chromium() as browser:
+        there = Path(folder)
+        stores = {
+            f"map of {count} x {count}": make_map(there / "map", count),
+            "branch": make_branch(there / "branch"),
+            "run": make_run(there / "run", 0.1),
+        }
+        for name, path in stores.items():
+            print(name)
+            show(browser, path)
+
+
+def show(browser: Browser, path: Path) -> None:
+    """Times of one store, from the command to the last click."""
+    began = time.perf_counter()
+    command = [sys.executable, "-m", "shapespace", "explore", str(path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
+        assert server.stdout is not None
+        address = server.stdout.readline().strip()
+        print(f"    command to address: {time.perf_counter() - began:.2f} s")
+        for words in ("opens at once", "opens again"):
+            began = time.perf_counter()
+            browser.open(address, SHOWN)
+            shown = time.perf_counter() - began
+            browser.wait(SHAPE)
+            print(f"    {words}: states drawn {shown:.2f} s, first shape {time.perf_counter() - began:.2f} s")
+        browser.wait("!!document.body.dataset.stage")
+        size = browser.run(
+            "performance.getEntriesByType('resource').reduce((sum, one) => sum + one.encodedBodySize, 0)"
+        )
+        print(f"    transferred: {size / 1e6:.1f} MB")
+        random = np.random.default_rng(1)
+        places = random.uniform(0.15, 0.85, (CLICKS, 2))
+        times = np.array([one for x, y in places if (one := browser.run(CLICK % (x, y))) is not None])
+        if len(times):
+            middle, worst = np.median(times, axis=0), times.max(axis=0)
+            print(f"    {len(times)} clicks, numbers: median {middle[0]:.0f} ms, longest {worst[0]:.0f} ms; "
+                  f"shape: median {middle[1]:.0f} ms, longest {worst[1]:.0f} ms")  # fmt: skip
+        server.terminate()
+
+
+if __name__ == "__main__":
+    main()

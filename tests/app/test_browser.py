@@ -1,0 +1,260 @@
+"""The explorer in Chromium: what it shows is what is stored, it asks no other machine, and everything goes by keyboard too."""
+
+import json
+import math
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.app.browser import Browser
+from tests.app.served import Stores
+from tests.app.stores import made_up
+
+from shapespace.app.explore import Explorer, export
+from shapespace.study.branch_store import BranchStore, open_branch
+from shapespace.study.store import RunStore
+
+RUN, BRANCH, MAP = 0, 1, 2
+LABEL = "pitchfork-1"
+
+
+@pytest.fixture(autouse=True)
+def nothing_goes_wrong(browser: Browser) -> Iterator[None]:
+    """No test leaves an error on the console."""
+    browser.errors.clear()
+    browser.requests.clear()
+    browser.resize(1280, 800)
+    yield
+    assert not browser.errors
+
+
+def open_page(browser: Browser, explorer: Explorer, store: int, **view: object) -> None:
+    browser.open(explorer.address + "#" + "&".join(f"{key}={value}" for key, value in {"store": store, **view}.items()))
+    browser.settle()
+
+
+def shown(browser: Browser) -> dict[str, float]:
+    """The numbers on the page, by name."""
+    return {
+        name: float(value) for name, value in browser.all("#facts [data-name]", "[e.dataset.name, e.dataset.value]")
+    }
+
+
+def title(browser: Browser) -> str:
+    return str(browser.run("document.querySelector('#facts .title b').textContent"))
+
+
+def has_shape(browser: Browser) -> bool:
+    return bool(browser.run("!!document.querySelector('#outline .shape')"))
+
+
+def test_a_branch_shows_the_numbers_of_its_points(browser: Browser, explorer: Explorer, stores: Stores):
+    branch = open_branch(stores.branch)
+    open_page(browser, explorer, BRANCH)
+    assert title(browser) == LABEL
+    assert shown(browser) == {**branch[LABEL].observables, "peclet": branch[LABEL].parameter}
+    assert {*browser.all(".special-label", "e.textContent")} == {
+        point.label for point in branch.special_points if point.kind != "end"
+    }
+    assert browser.run("document.querySelectorAll('#diagram .stable').length") == 1
+    assert browser.run("document.querySelectorAll('#diagram .unstable').length") == 1
+    rates = browser.all(".rate", "[e.dataset.real, e.dataset.imaginary]")
+    assert np.array_equal(np.array(rates, float), branch[LABEL].growth_rates)
+
+
+def test_clicking_points_and_keys_lead_along_a_branch(browser: Browser, explorer: Explorer, stores: Stores):
+    store = BranchStore.open(stores.branch)
+    open_page(browser, explorer, BRANCH, place=0)
+    assert shown(browser)["velocity"] == store.read(0).observables["velocity"]
+    browser.click("#diagram .special")
+    browser.settle()
+    assert title(browser) == next(point.label for point in open_branch(stores.branch).special_points)
+    browser.press("Home")
+    browser.settle()
+    browser.press("ArrowRight")
+    browser.settle()
+    assert shown(browser)["peclet"] == store.read(1).parameter
+    browser.press("n")
+    browser.settle()
+    assert title(browser) == LABEL
+    assert "place=" in browser.run("location.hash")
+
+
+def test_an_eigenvalue_sets_the_surface_swinging(browser: Browser, explorer: Explorer):
+    open_page(browser, explorer, BRANCH)
+    assert not browser.run("!!document.querySelector('#outline .moved')")
+    leading = browser.all(".rate .dot", "[e.getBoundingClientRect().x + 4, e.getBoundingClientRect().y + 4]")[0]
+    browser.click_at(*leading)
+    browser.settle()
+    assert browser.wait("!!document.querySelector('#outline .moved')")
+    # At the onset of swimming the sphere stays one: only the concentration changes.
+    note = "document.getElementById('note').textContent"
+    assert "mode 1, of the concentration alone" in browser.run(note)
+    path = "document.querySelector('#profiles .first').getAttribute('d')"
+    first = browser.run(path)
+    assert browser.wait(f"{path} !== {json.dumps(first)}")
+    browser.press("Escape")
+    browser.settle()
+    assert not browser.run("!!document.querySelector('#outline .moved')")
+    browser.press("2")
+    browser.settle()
+    assert "mode 2" in browser.run(note)
+    assert browser.run("location.hash").endswith("mode=1")
+
+
+def test_growth_rates_are_computed_where_they_are_not_stored(browser: Browser, explorer: Explorer):
+    open_page(browser, explorer, BRANCH, place=1)
+    browser.press("1")
+    browser.settle()
+    assert browser.wait("!!document.querySelector('#outline .moved')")
+    open_page(browser, explorer, MAP)
+    assert not browser.run("!!document.querySelector('.rate')")
+    browser.click("#compute")
+    browser.wait("!!document.querySelector('.rate')")
+    real = np.array(browser.all(".rate", "e.dataset.real"), float)
+    assert real.max() < 0.0
+
+
+def test_a_run_plays_from_its_start_to_its_end(browser: Browser, explorer: Explorer, stores: Stores):
+    run = RunStore.open(stores.run)
+    open_page(browser, explorer, RUN)
+    last = run.read(-1)
+    assert shown(browser) == {**last.observables, "time": last.time}
+    browser.choose("#time", 2)
+    browser.settle()
+    assert shown(browser)["time"] == run.read(2).time
+    browser.press("Home")
+    browser.settle()
+    browser.press(" ")
+    seen = set()
+    while browser.run("document.getElementById('play').getAttribute('aria-label')") == "Pause":
+        seen.add(browser.run("document.getElementById('time').value"))
+    browser.settle()
+    assert len(seen) > 2
+    assert shown(browser)["time"] == last.time
+
+
+def test_a_map_of_many_points_shows_any_of_them(browser: Browser, explorer: Explorer):
+    open_page(browser, explorer, MAP)
+    canvas = json.loads(
+        browser.run("JSON.stringify(document.querySelector('#diagram canvas').getBoundingClientRect())")
+    )
+    for across, up in ((0.105, 0.895), (0.675, 0.225)):
+        at = canvas["x"] + across * canvas["width"], canvas["y"] + (1.0 - up) * canvas["height"]
+        browser.move(*at)
+        i, j = int(across * 100), int(up * 100)
+        x, y = 10.0 + i * 10.0 / 99, 0.5 + j * 4.5 / 99
+        assert "velocity" in browser.wait(
+            "!document.getElementById('tip').hidden && document.getElementById('tip').textContent"
+        )
+        browser.click_at(*at)
+        browser.settle()
+        numbers = shown(browser)
+        assert (numbers["peclet"], numbers["inverse_hydrodynamic_length"]) == pytest.approx((x, y), rel=1e-12)
+        assert numbers["velocity"] == float(made_up(numbers["peclet"], numbers["inverse_hydrodynamic_length"]))
+        assert numbers["area"] == pytest.approx(4.0 * math.pi)
+        assert has_shape(browser)
+    browser.press("ArrowUp")
+    browser.settle()
+    assert shown(browser)["inverse_hydrodynamic_length"] > numbers["inverse_hydrodynamic_length"]
+
+
+def test_what_is_chosen_comes_back_by_its_address(browser: Browser, explorer: Explorer):
+    open_page(browser, explorer, BRANCH)
+    for chosen, value in (("choose-y", "velocity"), ("choose-x", "area"), ("choose-colour", "meridional_curvature")):
+        browser.choose(f"#{chosen}", value)
+    browser.press("t")
+    browser.press("f")
+    browser.press("End")
+    browser.settle()
+    before = shown(browser)
+    chosen = browser.all(".tools select", "e.value"), browser.run("document.documentElement.dataset.theme")
+    browser.open(browser.run("location.href"))
+    browser.settle()
+    assert shown(browser) == before
+    assert (browser.all(".tools select", "e.value"), browser.run("document.documentElement.dataset.theme")) == chosen
+    assert "velocity" in chosen[0]
+
+
+def test_python_and_commands_are_copied(browser: Browser, explorer: Explorer, stores: Stores):
+    browser.send("Browser.grantPermissions", permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])
+    open_page(browser, explorer, BRANCH)
+    browser.click("#python")
+    browser.wait("!document.getElementById('toast').hidden")
+    names: dict[str, Any] = {}
+    exec(browser.run("navigator.clipboard.readText()"), names)
+    assert names["state"].observables["area"] == pytest.approx(4.0 * math.pi)
+    browser.press("c")
+    command = browser.run("document.querySelector('#command-branch').textContent")
+    assert command.startswith("shapespace branch polar-swimmer ")
+    assert f"--from {stores.branch}:{LABEL}" in command
+    browser.choose("dialog input", 77)
+    assert "--stop 77 " in browser.run("document.querySelector('#command-branch').textContent")
+
+
+def test_help_says_what_the_store_is(browser: Browser, explorer: Explorer, stores: Stores):
+    open_page(browser, explorer, RUN)
+    browser.press("?")
+    words = browser.run("document.getElementById('dialog').textContent")
+    assert str(stores.run) in words
+    assert "next state" in words
+
+
+def test_no_other_machine_is_asked(browser: Browser, explorer: Explorer):
+    for store in (RUN, BRANCH, MAP):
+        open_page(browser, explorer, store)
+    assert len(browser.requests) > 20
+    assert not [one for one in browser.requests if not one.startswith((explorer.address, "about:", "data:"))]
+
+
+def test_an_exported_file_works_from_disk(browser: Browser, stores: Stores, tmp_path: Path):
+    file = export([stores.branch, stores.run], tmp_path / "explored.html")
+    branch = open_branch(stores.branch)
+    browser.open(file.as_uri())
+    browser.settle()
+    assert title(browser) == LABEL
+    assert shown(browser) == {**branch[LABEL].observables, "peclet": branch[LABEL].parameter}
+    assert has_shape(browser)
+    browser.press("1")
+    assert browser.wait("!!document.querySelector('#outline .moved')")
+    browser.press("s")
+    browser.settle()
+    last = RunStore.open(stores.run).read(-1)
+    assert shown(browser) == {**last.observables, "time": last.time}
+    assert {one for one in browser.requests if not one.startswith(("data:", "about:"))} == {file.as_uri()}
+
+
+def test_damaged_stores_say_so_and_the_rest_is_shown(
+    browser: Browser, serve: Callable[..., Explorer], stores: Stores, tmp_path: Path
+):
+    damaged = tmp_path / "damaged"
+    shutil.copytree(stores.run, damaged)
+    frame = damaged / "frames" / "000001.npz"
+    frame.write_bytes(frame.read_bytes()[:500])
+    explorer = serve(damaged, stores.branch)
+    open_page(browser, explorer, 0)
+    trouble = browser.run("document.getElementById('trouble').textContent")
+    assert str(frame) in trouble
+    assert "--resume" in trouble
+    # The answer that tells of it has a status of its own, which Chromium notes.
+    assert all("422" in one for one in browser.errors)
+    browser.errors.clear()
+    browser.press("s")
+    browser.choose("#store", 1)
+    browser.settle()
+    assert title(browser) == LABEL
+    assert browser.run("document.getElementById('trouble').hidden")
+
+
+@pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844)])
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_nothing_is_wider_than_the_screen(browser: Browser, explorer: Explorer, width: int, height: int, theme: str):
+    browser.resize(width, height, mobile=width < 600)
+    for store in (RUN, BRANCH, MAP):
+        open_page(browser, explorer, store, theme=theme)
+        assert browser.run("document.documentElement.scrollWidth") <= width
+        edges = browser.all("button, select, h2, .panel", "e.getBoundingClientRect().right")
+        assert max(edges) <= width + 1
