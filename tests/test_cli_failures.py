@@ -61,3 +61,15 @@ def test_a_branch_that_stalls_keeps_its_points_and_goes_on(shell: Shell, monkeyp
     assert (end["kind"], end["parameter"]) == ("branch-stalled", pytest.approx(21.7, abs=1e-6))
     answer = shell(*BRANCH, "--no-stability", "--resume")
     assert (answer.status, json.loads(answer.out)["outcome"]) == (0, "reached-stop")
+
+
+def test_no_state_beyond_a_fold(shell: Shell):
+    """The undivided branch of Fig. 7b ends at the fold at 2.3625: stepping stops short of it and does not jump."""
+    ring = ("steady", "guided-division", "-s", "elements=40")
+    assert shell(*ring, "ring_amplitude=2.2", "--out", "before").status == 0
+    answer = shell(*ring, "ring_amplitude=3", "--from", "before", "--json")
+    record = json.loads(answer.out, parse_constant=pytest.fail)
+    assert (answer.status, record["outcome"], record["observables"]) == (3, "not-reached", {})
+    assert "follow the branch" in record["advice"]
+    reached = float(answer.err.split("at ring_amplitude = ")[1].rstrip(".\n"))
+    assert 2.35 < reached < 2.3625

@@ -2,26 +2,40 @@
 
 import numpy as np
 
-from shapespace.numerics.small_lu import compiled
+from shapespace.base.problem import Border
+from shapespace.numerics.small_lu import Array, compiled, copy, put, read_only
+
+
+def with_border(
+    border: Border, widths: Array, weights: Array, n: int, points: Array, ends: Array, targets: Array
+) -> tuple[Array, ...]:
+    """The blocks (points, ends, targets, jumps, nodes) of the bordered system, as `condensation.factorise` takes them.
+
+    border.columns (m_b, size): flat as residuals (equations (N, k, m), continuity (N, n), ends, integrals); border.rows
+    (m_b, size): flat as states (nodes (N + 1, n), slopes (N, k, n), algebraic (N, k, n_a), scalars).
+    """
+    columns, rows, corner = (
+        read_only(np.ascontiguousarray(part)) for part in (border.columns, border.rows, border.corner)
+    )
+    blocks = (read_only(part) for part in (points, ends, targets))
+    return _bordered(columns, rows, corner, widths, weights, n, *blocks)
 
 
 @compiled
-def with_border(columns, rows, corner, widths, weights, n, points, ends, targets):  # type: ignore[no-untyped-def]
-    """The blocks (points, ends, targets, jumps, nodes) of the bordered system, as `condensation.factorise` takes them.
-
-    columns (m_b, size): flat as residuals (equations (N, k, m), continuity (N, n), ends, integrals); rows (m_b, size): flat
-    as states (nodes (N + 1, n), slopes (N, k, n), algebraic (N, k, n_a), scalars); corner (m_b, m_b).
-    """
+def _bordered(columns, rows, corner, widths, weights, n, points, ends, targets):  # type: ignore[no-untyped-def]
     n_rows, n_columns, k, elements = points.shape
     (n_i, n_s), (n_b, end_columns), extra = targets.shape, ends.shape, corner.shape[0]
     m = n_rows - n_i
     slopes, algebraic, scalars = (elements + 1) * n, (elements + 1 + elements * k) * n, elements * (k * m + n) + n
     continuity, at_ends, integrals = elements * k * m, elements * (k * m + n), elements * (k * m + n) + n_b
     wide = np.zeros((n_rows + extra, n_columns + extra, k, elements))
-    wide[:n_rows, :n_columns] = points
+    for c in range(n_rows):
+        for d in range(n_columns):
+            copy(wide[c, d], points[c, d])
     jumps, nodes = np.zeros((elements, n, n_s + extra)), np.zeros((elements + 1, n_i + extra, n))
     wide_ends, wide_targets = np.empty((n_b, end_columns + extra)), np.empty((n_i + extra, n_s + extra))
-    wide_ends[:, :end_columns], wide_targets[:n_i, :n_s] = ends, targets
+    copy(wide_ends[:, :end_columns], ends)
+    copy(wide_targets[:n_i, :n_s], targets)
     for b in range(extra):
         column, row = columns[b], rows[b]
         for j in range(k):
@@ -40,8 +54,8 @@ def with_border(columns, rows, corner, widths, weights, n, points, ends, targets
         for e in range(elements + 1):
             for c in range(n):
                 nodes[e, n_i + b, c] = row[e * n + c]
-        wide_ends[:, end_columns + b] = column[at_ends:integrals]
-        wide_targets[:n_i, n_s + b] = -column[integrals:]
-        wide_targets[n_i + b, :n_s] = -row[scalars:]
-        wide_targets[n_i + b, n_s:] = -corner[b]
+        put(wide_ends[:, end_columns + b], column[at_ends:integrals])
+        put(wide_targets[:n_i, n_s + b], -column[integrals:])
+        put(wide_targets[n_i + b], -row[scalars:])
+        put(wide_targets[n_i + b, n_s:], -corner[b])
     return wide, wide_ends, wide_targets, jumps, nodes

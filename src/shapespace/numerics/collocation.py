@@ -15,7 +15,7 @@ from shapespace.numerics.border import with_border
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.layout import assembled, by_element, joined, lay_out, product
 from shapespace.numerics.pointwise import Density, Functions, compiled_functions, numbers, points_per_tile
-from shapespace.numerics.small_lu import compiled
+from shapespace.numerics.small_lu import compiled, read_only
 from shapespace.numerics.state import State
 from shapespace.numerics.system import AbstractSystem
 
@@ -172,7 +172,7 @@ class CollocationProblem(AbstractSmoothProblem):
         """The flat residual from the flat values of all tiles: equations, continuity, end conditions, integral conditions."""
         values = np.asarray(parts[0])[None] if len(parts) == 1 else np.stack(parts)
         weights, n_i = gauss_rule(self.degree).weights, self.n_integrals
-        return assembled(values, x, self.mesh, weights, self.n, self.n_rows, n_i, self._tile)
+        return assembled(read_only(values), x, self.mesh, weights, self.n, self.n_rows, n_i, self._tile)
 
     def residual(self, x: Array, p: Array, rate: Rate) -> Array:
         """Equations at the Gauss points, continuity, end conditions, integral conditions."""
@@ -192,13 +192,10 @@ class CollocationProblem(AbstractSmoothProblem):
     ) -> tuple[Array, CollocationLinearisation]:
         """Residual and factorised Jacobian. A border's columns become scalars, its rows integral conditions."""
         residual, points, ends, targets = self.blocks(x, p, rate)
-        rule, extra = gauss_rule(self.degree), ()
+        rule, extra = gauss_rule(self.degree), list[Array]()
         if border is not None:
-            columns, rows, corner = (
-                np.ascontiguousarray(part) for part in (border.columns, border.rows, border.corner)
-            )
             points, ends, targets, *extra = with_border(
-                columns, rows, corner, self._widths, rule.weights, self.n, points, ends, targets
+                border, self._widths, rule.weights, self.n, points, ends, targets
             )
         factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *extra)
         return residual, CollocationLinearisation(self, factors)
@@ -222,7 +219,7 @@ class CollocationProblem(AbstractSmoothProblem):
 
     def _product(self, blocks: Sequence[Array], jumps: float) -> Callable[[Array], Array]:
         """Multiplication by a matrix of these blocks (points, ends, targets), with `jumps` times the continuity rows."""
-        points, ends, targets = blocks
+        points, ends, targets = map(read_only, blocks)
         structure, rule = points.any(axis=(2, 3)), gauss_rule(self.degree)
         return lambda dx: product(
             np.ascontiguousarray(dx), points, structure, ends, targets, self.mesh, rule.matrix, rule.weights, jumps

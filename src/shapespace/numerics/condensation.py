@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from shapespace.numerics.elimination import LocalFactors, Plan, eliminate_stages, make_plan, solve_stages
-from shapespace.numerics.small_lu import Array, IntArray, backward, compiled, copy, forward, lu_rectangular
+from shapespace.numerics.small_lu import Array, IntArray, backward, compiled, copy, forward, lu_rectangular, read_only
 
 NO_PIVOT = 1e-14
 """Pivots of the border smaller than this part of their column count as vanished."""
@@ -189,6 +189,7 @@ def factorise(
         raise ValueError(
             f"blocks do not fit: points {points.shape}, ends {ends.shape}, targets {targets.shape}, n = {n}."
         )
+    points, ends, targets = read_only(points), read_only(ends), read_only(targets)
     jumps = np.zeros((n_elements, n, n_s)) if jumps is None else jumps
     integral = np.zeros((n_elements + 1, n_i, n)) if nodes is None else nodes.copy()
     plan = make_plan(widths, matrix, points, n, m)

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from shapespace.numerics.small_lu import Array, compiled
+from shapespace.numerics.small_lu import Array, compiled, put
 
 
 @compiled
@@ -51,13 +51,13 @@ def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, point
         column[2 * n + n_a + n_q] = mesh[e] + width * stages[j]
     for index in range(n_tiles):
         ends = out[index, first_ends:]
-        ends[:n_s] = x[scalars:]
-        ends[n_s : n_s + n] = x[:n]
-        ends[n_s + n : n_s + 2 * n] = x[elements * n : slopes]
+        put(ends, x[scalars:])
+        put(ends[n_s:], x[:n])
+        put(ends[n_s + n :], x[elements * n : slopes])
         if moves:
-            ends[n_s + 2 * n : n_s + 2 * n + 2 * n_q] = history[n_points * n_q :]
+            put(ends[n_s + 2 * n :], history[n_points * n_q :])
         ends[n_s + 2 * n + 2 * n_q] = coefficient
-        ends[n_s + 2 * n + 2 * n_q + 1 :] = p
+        put(ends[n_s + 2 * n + 2 * n_q + 1 :], p)
     return out
 
 
@@ -86,7 +86,7 @@ def assembled(values, x, mesh, weights, n, m, n_i, points_per_tile):  # type: ig
             for l in range(k):
                 total += weights[l] * x[slopes + (e * k + l) * n + c]
             out[equations + e * n + c] = x[(e + 1) * n + c] - x[e * n + c] - (mesh[e + 1] - mesh[e]) * total
-    out[equations + elements * n : equations + elements * n + n_b] = border[:n_b]
+    put(out[equations + elements * n :], border[:n_b])
     return out
 
 

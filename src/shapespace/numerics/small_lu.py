@@ -1,4 +1,4 @@
-"""Small dense systems in numba: LU with row pivoting, and its two triangular solves."""
+"""Small dense systems in numba: LU with row pivoting, its two triangular solves, and copies that compile quickly."""
 
 import numpy as np
 from numba import njit
@@ -10,6 +10,20 @@ BoolArray = NDArray[np.bool_]
 
 # Contraction to fused multiply-adds and reassociated sums are allowed, but NaN and infinity keep their meaning.
 compiled = njit(cache=True, nogil=True, fastmath={"contract", "reassoc", "nsz"}, error_model="numpy")
+
+
+def read_only(array: Array) -> Array:
+    """A view that cannot be written to. Kernels compile once for all of them, and again for arrays that can be."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
+@compiled
+def put(target, source):  # type: ignore[no-untyped-def]
+    """target[:] = source for vectors of one length; see copy."""
+    for i in range(source.shape[0]):
+        target[i] = source[i]
 
 
 @compiled
