@@ -6,10 +6,10 @@ JOBS ?= 2
 BIN := .venv/bin
 STAMP := .venv/.installed
 DEMO := results/guided-division
-SOURCES := $(wildcard src tests benchmarks experiments)
+SOURCES := $(wildcard src tests benchmarks experiments docs/*.py)
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow format bench clean
+.PHONY: help setup demo test test-slow docs format bench clean
 .DELETE_ON_ERROR:
 
 help: ## show the targets
@@ -30,6 +30,10 @@ test: $(STAMP) ## format, lint, types, import ranks and tests
 
 test-slow: $(STAMP) ## the tests that take minutes
 	$(BIN)/python -m pytest -n $(JOBS) -m slow
+
+docs: $(STAMP) ## run every page of the documentation and build it in build/docs/html
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	$(BIN)/python -m sphinx -W --keep-going -b html docs build/docs/html
 
 format: $(STAMP) ## rewrite the sources in the common format and mend what lint can mend
 	$(BIN)/ruff format $(SOURCES)

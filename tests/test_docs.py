@@ -6,12 +6,14 @@ import shlex
 import shutil
 import subprocess
 import sys
+import traceback
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 import numpy as np
 import pytest
+from docs.executed import blocks_of, run_page
 
 import shapespace as ss
 from shapespace.cli import app
@@ -77,15 +79,64 @@ def test_a_term_can_be_added_as_the_page_says():
 @pytest.mark.usefixtures("short")
 def test_a_map_is_read_as_the_page_says():
     axes = ("peclet=20:26:2", "inverse_hydrodynamic_length=1:2:2")
-    store = ss.diagram(ss.scenario("polar-swimmer"), *axes, out="map", workers=1).store
-    names = {"store": store}
+    ss.diagram(ss.scenario("polar-swimmer"), *axes, out="results/swimmers", workers=1)
+    names: dict[str, Any] = {}
     exec(blocks(ROOT / "docs" / "how-to" / "map-shape-space.md", "python")[-1], names)
     assert names["found"].converged == 2
 
 
-def test_every_python_block_is_run():
-    run = {"README.md", "file-format.md", "add-a-term.md", "map-shape-space.md"}
-    assert {page.name for page in PAGES if blocks(page, "python")} == run
+@pytest.mark.usefixtures("short", "own_models")
+def test_the_tutorial_on_laws_runs():
+    run_blocks(ROOT / "docs" / "tutorials" / "own-law.md")
+
+
+RUN = [
+    page
+    for page in PAGES
+    if any(block.note != "not run" for block in blocks_of(page)) and "benchmarks" not in page.parts
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", RUN, ids=lambda page: page.stem)
+def test_pages_run_as_they_are(page: Path, tmp_path: Path):
+    """All blocks and commands, as `make docs` runs them."""
+    command = [sys.executable, ROOT / "docs" / "executed.py", page, tmp_path / "page"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_no_block_escapes():
+    """What is neither Python nor shell is no code that a reader could run; comments that steer stand before a block."""
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        fences = re.findall(r"^```([^\n]*)\n.*?^```", text, flags=re.MULTILINE | re.DOTALL)
+        shown = [block for block in blocks_of(page) if block.text in "".join(blocks(page, block.language))]
+        assert fences.count("python") + fences.count("sh") == len(shown), page.name
+        others = {fence.partition(" ")[0] for fence in fences} - {"python", "sh"}
+        assert not others - {"math", "toml", "", "{toctree}", "{image}", "{eval-rst}"}
+        steering = re.findall(r"^<!-- (?:not run|file):", text, flags=re.MULTILINE)
+        assert len(steering) == sum(bool(block.note) for block in blocks_of(page)), page.name
+
+
+def test_a_page_runs_in_order_and_says_where_it_failed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    page = Path("page.md")
+    blocks = [
+        "<!-- run first\nshapespace config vesicle --out a.toml\n-->",
+        "<!-- file: b.py -->\n```python\nfrom pathlib import Path\n\nassert Path('b.py').exists()\n```",
+        "```python\nassert Path('a.toml').exists()\n```",
+        "<!-- not run: never -->\n```python\nraise KeyError\n```",
+        "```sh\nshapespace config vesicle --out c.toml  # a comment\n```",
+    ]
+    page.write_text("\n\n".join(blocks))
+    run_page(page)
+    assert Path("c.toml").exists()
+    for text, said in (("```python\n1 / 0\n```", "block 1"), ("```sh\nshapespace run nothing\n```", "exit status 2")):
+        page.write_text(text)
+        with pytest.raises((ZeroDivisionError, RuntimeError)) as raised:
+            run_page(page)
+        assert said in "".join(traceback.format_exception(raised.value))
 
 
 def shell_lines() -> list[tuple[str, str]]:
@@ -141,4 +192,6 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
 def test_links_lead_somewhere():
     for page in PAGES:
         for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-            assert target.startswith("http") or (page.parent / target).exists(), f"{page.name}: {target}"
+            made = "/".join(Path(target).parts[-2:])
+            is_made = made.startswith("made/") and any(Path(target).name in block.text for block in blocks_of(page))
+            assert target.startswith("http") or is_made or (page.parent / target).exists(), f"{page.name}: {target}"

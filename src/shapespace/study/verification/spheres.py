@@ -16,7 +16,6 @@ from shapespace.study.verification.record import Row
 from shapespace.study.verification.states import found_state, special_point
 
 FORM = "closed form"
-PAPER = "closed form; Gao, Sun, Ma & Mietke, Sec. V B 1"
 
 
 def resting(spontaneous_curvature: float = 2.0, tension: float = -0.5) -> Iterator[Row]:
@@ -58,11 +57,11 @@ def polarization() -> Iterator[Row]:
     case = scenario("polar-swimmer")
     found = branch(case, "peclet", 23.0, start=21.0, state="trivial", stability=False)
     fork = special_point(found, "pitchfork")
-    yield Row("Pe* of the pitchfork, k = 9", fork.parameter, polar_onset(1.0, 9.0), PAPER, 1e-9)
+    yield Row("Pe* of the pitchfork, k = 9", fork.parameter, polar_onset(1.0, 9.0), FORM, 1e-9)
     case = scenario("polar-swimmer", saturation_concentration=10.0, turnover_rate=45.0)
     found = branch(case, "peclet", 2410.0, start=2390.0, state="trivial", stability=False)
     fork = special_point(found, "pitchfork")
-    yield Row("Pe* of the pitchfork, c_s = 10 c0, k = 45", fork.parameter, polar_onset(10.0, 45.0), PAPER, 1e-9)
+    yield Row("Pe* of the pitchfork, c_s = 10 c0, k = 45", fork.parameter, polar_onset(10.0, 45.0), FORM, 1e-9)
 
 
 def hopf() -> Iterator[Row]:
