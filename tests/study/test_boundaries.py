@@ -1,8 +1,12 @@
 """Boundaries of diagrams: curves against closed forms and the map's own changes; regimes; resuming; their picture."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.boundaries import NEAR, distances, find_changes
 from shapespace.study.diagram_store import BOUNDARIES, CURVES, Diagram
@@ -95,3 +99,56 @@ def test_curves_are_drawn_over_maps(mapped: Diagram):
         "symmetric & asymmetric, stable & unstable, resting & swimming",
         "pitchforks",
     ]
+
+
+FOLDS = (1.293485375, 2.362474188)
+"""Of guided division at Pe = 450 by AUTO-07p: benchmarks/README.md."""
+
+
+@pytest.fixture(scope="module")
+def division(tmp_path_factory: pytest.TempPathFactory) -> Diagram:
+    """Ellipsoids, dumbbells and what lies between, across the wedge."""
+    out = tmp_path_factory.mktemp("boundaries") / "wedge"
+    axes = ("ring_amplitude=0.9:2.7:7", "peclet=440:450:2")
+    return diagram(scenario("guided-division", elements=40), *axes, branches=3, out=out, workers=1)
+
+
+def test_all_states_between_two_folds(division: Diagram):
+    """Three between the folds that another program finds, one elsewhere; in the order of their bending energy."""
+    row = division.dataset.sel(peclet=450.0)
+    inside = (row["ring_amplitude"] > FOLDS[0]) & (row["ring_amplitude"] < FOLDS[1])
+    assert row["n_states"].to_numpy().tolist() == np.where(inside, 3, 1).tolist()
+    energy = row["bending_energy"]
+    assert (energy.diff("state").where(inside, 1.0) > 0.0).all()
+    necks = [bool(code & Regime.NECK) for code in division.regimes[-1].tolist()]
+    rounds = [bool(code & Regime.NO_NECK) for code in division.regimes[-1].tolist()]
+    # At ring_amplitude = 2.1 the ellipsoid has a slight waist already.
+    assert (necks, rounds) == ([False] * 2 + [True] * 5, [True] * 4 + [False] * 3)
+    assert (division.points, division.converged, division.failed) == (14, 14, [])
+    assert division.dataset["state"].to_numpy().tolist() == ["state-1", "state-2", "state-3"]
+
+
+@pytest.mark.slow
+def test_folds_of_the_map_are_those_of_a_branch(division: Diagram):
+    """To 1e-6, and those of another program; every change of the number of states lies within a cell of one."""
+    found = diagram(
+        division.scenario, *map(str, (division.request.grid.x, division.request.grid.y)), branches=3, boundaries=True,
+        out=division.store, workers=1, resume=True,
+    )  # fmt: skip
+    assert found.unexplained == []
+    ends = [point.parameters for curve in found.boundaries for point in curve.points]
+    at_edge = sorted(float(one[0]) for one in ends if abs(one[1] - 450.0) < 1e-9)
+    np.testing.assert_allclose(at_edge, FOLDS, atol=1e-6)
+
+
+def test_bad_numbers_of_branches(tmp_path: Path):
+    axes = ("ring_amplitude=0.9:2.7:7", "peclet=440:450:2")
+    for arguments, part in (
+        ({"branches": -1}, "--branches -1: must be 1 to 16"),
+        ({"branches": 17}, "--branches 17"),
+        ({"origins": ("nowhere",)}, "give that too"),
+        ({"branches": 2, "origins": ("nowhere",)}, "nowhere"),
+    ):
+        with pytest.raises((InputError, StoreError), match=re.escape(part)):
+            diagram(scenario("guided-division"), *axes, out=tmp_path / "d", workers=1, **arguments)  # type: ignore[arg-type]
+    assert not (tmp_path / "d").exists()

@@ -52,12 +52,18 @@ def solve_stationary(
         x, problem, moves = problem.carried(root.x, better), better, moves + 1
 
 
-def step_to(start: Stationary, p: Array, newton: Newton = STEP_NEWTON, smallest: float = 1e-3) -> Stationary:
+def step_to(
+    start: Stationary,
+    p: Array,
+    newton: Newton = STEP_NEWTON,
+    smallest: float = 1e-3,
+    largest_miss: float = LARGEST_MISS,
+) -> Stationary:
     """The state that a known one becomes at parameters p, along the straight line from its own.
 
     Each step is predicted by the tangent -F_x^-1 F_p dp, halved where it fails and doubled where it succeeds. Where steps fall
-    below the share `smallest` of the way, the search ends as NOT_REACHED with the last state and its parameters. A start that
-    is no solution comes back as it is.
+    below the share `smallest` of the way, the search ends as NOT_REACHED with the last state and its parameters. largest_miss:
+    of a step from its prediction. A start that is no solution comes back as it is.
     """
     if not start.outcome.is_success:
         return start
@@ -65,7 +71,7 @@ def step_to(start: Stationary, p: Array, newton: Newton = STEP_NEWTON, smallest:
     while done < 1.0:
         share = min(share, 1.0 - done)
         last = share == 1.0 - done
-        found = _stepped(now, p if last else start.p + (done + share) * (p - start.p), newton)
+        found = _stepped(now, p if last else start.p + (done + share) * (p - start.p), newton, largest_miss)
         if found is not None:
             now, done, share = found, 1.0 if last else done + share, 2.0 * share
         elif share < 2.0 * smallest:
@@ -75,7 +81,7 @@ def step_to(start: Stationary, p: Array, newton: Newton = STEP_NEWTON, smallest:
     return now
 
 
-def _stepped(now: Stationary, p: Array, newton: Newton) -> Stationary | None:
+def _stepped(now: Stationary, p: Array, newton: Newton, largest_miss: float) -> Stationary | None:
     """The same state at parameters p nearby; None where Newton fails or ends far from the prediction."""
     problem, x = now.problem, now.x
     _, linearisation = problem.linearise(x, now.p, Rate.of_growth(problem.stored(x, now.p)))
@@ -86,4 +92,4 @@ def _stepped(now: Stationary, p: Array, newton: Newton) -> Stationary | None:
     if found.outcome is not Outcome.CONVERGED:
         return None
     miss = problem.norm(found.problem.carried(found.x, problem) - guess, guess)
-    return replace(found, iterations=now.iterations + found.iterations) if miss <= LARGEST_MISS else None
+    return replace(found, iterations=now.iterations + found.iterations) if miss <= largest_miss else None

@@ -8,11 +8,12 @@ which misses by the m-th difference of x; Newton's method then starts with the f
 are tried in which order depends on the grid and on what exists there, never on time or on other grids.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from shapespace.analysis.deflation import is_same
 from shapespace.analysis.stationary import LARGEST_MISS, Stationary, step_to
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -30,6 +31,12 @@ SHORTEST = 1.0 / 16.0
 """Of the way between neighbours that is worth a step: more often than not there is no state beyond."""
 NOTABLE = 1e-2
 """A state that misses its guess by more is looked at: it may be one that the symmetry distinguishes."""
+STRICT = 2e-2
+"""The same for a sweep that must not pass from one sheet of states to another,"""
+DOUBTFUL = 1e-3
+"""and a state that misses by more than this must lie on the same side of all folds as its neighbour."""
+NEARLY = 0.1
+"""States on different discretisations that differ by more are two."""
 SYMMETRIC = 1e-6
 """States that differ less from their mirror image are their own."""
 MAX_MOVES = 6
@@ -38,9 +45,16 @@ MAX_TRIES = 2
 
 @dataclass
 class Sweep:
-    """The states found so far on a grid. values (n_0, n_1, m): parameters. reasons: why there is none, where one was tried."""
+    """The states found so far on a grid. values (n_0, n_1, m): parameters. reasons: why there is none, where one was tried.
+
+    is_strict: stay on one sheet of states, up to its folds. others: sweeps whose states are known; where this one comes upon
+    them it ends, at the points `met`.
+    """
 
     values: Array
+    is_strict: bool = False
+    others: Sequence["Sweep"] = ()
+    met: set[Index] = field(default_factory=set)
     found: dict[Index, Stationary] = field(default_factory=dict)
     reasons: dict[Index, Outcome] = field(default_factory=dict)
     newton: Newton = SWEEP_NEWTON
@@ -59,14 +73,20 @@ class Sweep:
         return [at for at in np.ndindex(*self.values.shape[:2]) if at not in self.found]
 
     def begin(self, at: Index, state: Stationary) -> bool:
-        """Take a state, stepping from its own parameters to those of a point; False where that fails."""
+        """Take a state, stepping from its own parameters to those of a point; False where that fails, or it is known there."""
         there = state
         if not np.array_equal(state.p, self.p(at)):
-            there = step_to(state, self.p(at), self.newton, SHORTEST)
+            there = self._stepped(state, at)
             if not there.outcome.is_success or not _is_like(there, state):
                 return False
+        if self._is_known(at, there):
+            return False
         self.found[at] = there
         return True
+
+    def settled(self, state: Stationary) -> Stationary:
+        """A state converged on a discretisation that is good enough for it."""
+        return self._newton(state.problem, state.x, state.p)
 
     def spread(self, start: Index) -> None:
         """Find the states at all points that can be come to from the known ones, line by line from `start` on."""
@@ -75,10 +95,12 @@ class Sweep:
         while grows:
             grows = False
             for at in order:
-                if at in self.found or not self._is_worth(at):
+                if at in self.found or at in self.met or not self._is_worth(at):
                     continue
                 state = self._solved(at)
-                if state is not None:
+                if state is not None and self._is_known(at, state):
+                    self.met.add(at)
+                elif state is not None:
                     self.found[at] = state
                     grows = True
 
@@ -102,10 +124,10 @@ class Sweep:
             if state is not None:
                 return state
         for one in self._known(at)[:2]:
-            state = step_to(self.found[one], self.p(at), self.newton, SHORTEST)
+            state = self._stepped(self.found[one], at)
             if not state.outcome.is_success:
                 self.reasons[at] = state.outcome
-            elif _is_like(state, self.found[one]):
+            elif _is_like(state, self.found[one]) and (not self.is_strict or _is_beside(state, self.found[one])):
                 return state
             else:
                 self.reasons[at] = Outcome.NO_STATE
@@ -131,10 +153,22 @@ class Sweep:
             return None
         x = state.x if state.problem is problem else state.problem.carried(state.x, problem)
         miss = problem.norm(x - guess, guess)
+        if self.is_strict and (miss > STRICT or (miss > DOUBTFUL and not _is_beside(state, self.found[run[0]]))):
+            self.reasons[at] = Outcome.NO_STATE
+            return None
         if miss <= NOTABLE or (miss <= LARGEST_MISS and _is_like(state, self.found[run[0]])):
             return state
         self.reasons[at] = Outcome.NO_STATE
         return None
+
+    def _stepped(self, state: Stationary, at: Index) -> Stationary:
+        """What a state becomes at a point, by short steps."""
+        return step_to(state, self.p(at), self.newton, SHORTEST, STRICT if self.is_strict else LARGEST_MISS)
+
+    def _is_known(self, at: Index, state: Stationary) -> bool:
+        """Whether another sweep has this state, or its mirror image."""
+        known = (other.found[at] for other in self.others if at in other.found)
+        return any(_is_near(state, one) and is_same(state, one) for one in known)
 
     def _on(self, problem: AbstractContinuableProblem, at: Index) -> Array:
         """A known state on the discretisation of a problem, where it then stays."""
@@ -163,6 +197,25 @@ class Sweep:
             assert isinstance(better, AbstractContinuableProblem)
             x, problem = problem.carried(root.x, better), better
         return Stationary(problem, root.x, p, root.outcome, root.correction, np.nan, iterations, move < MAX_MOVES)
+
+
+def _is_near(state: Stationary, other: Stationary) -> bool:
+    """Whether two states, or one and the other's mirror image, are near enough to be one on different discretisations."""
+    problem, image = state.problem, _image(state)
+    there = other.x if other.problem is problem else other.problem.carried(other.x, problem)
+    images = (state.x,) if image is None else (state.x, image)
+    return min(problem.norm(one - there, there) for one in images) < NEARLY
+
+
+def _is_beside(state: Stationary, other: Stationary) -> bool:
+    """Whether no fold lies between two states: the determinants of their Jacobians have one sign."""
+    problem = state.problem
+    there = other.x if other.problem is problem else other.problem.carried(other.x, problem)
+    signs = []
+    for x, p in ((state.x, state.p), (there, other.p)):
+        _, linearisation = problem.linearise(x, p, Rate.of_growth(problem.stored(x, p)))
+        signs.append(linearisation.sign)
+    return signs[0] == signs[1]
 
 
 def _is_like(state: Stationary, other: Stationary) -> bool:

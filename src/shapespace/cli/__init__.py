@@ -23,6 +23,7 @@ from shapespace.cli import pictures as pictures  # isort: skip
 from shapespace.cli import explorer as explorer  # isort: skip
 from shapespace.cli import checking as checking  # isort: skip
 from shapespace.cli import verifying as verifying  # isort: skip
+from shapespace.cli import reproducing as reproducing  # isort: skip
 from shapespace.cli.shared import BAD_INPUT, INTERRUPTED, app, tell
 
 

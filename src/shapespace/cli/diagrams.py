@@ -52,6 +52,16 @@ def diagram_command(
     state: Annotated[
         str, Parameter(metavar="NAMES", help="States to map, as of `steady`, with commas between them.")
     ] = "default",
+    branches: Annotated[
+        int,
+        Parameter(
+            metavar="N", help="Up to N states at each point: all that folds connect with those of --state and --from."
+        ),
+    ] = 0,
+    origins: Annotated[
+        tuple[str, ...],
+        Parameter(name="--from", metavar="STORE[:LABEL]", help="With --branches: stored states to start from as well."),
+    ] = (),
     stability: Annotated[bool, Parameter(help="Store the number of growing modes of each state too.")] = False,
     boundaries: Annotated[
         bool, Parameter(help="Follow the folds and branch points that bound regions; drawn over the map by `plot`.")
@@ -84,6 +94,7 @@ def diagram_command(
             rate = _Rate(display, path)
             found = diagram(
                 chosen, x, y, out=path, states=state.split(","), stability=stability, boundaries=boundaries,
+                branches=branches, origins=origins,
                 workers=workers, dask=dask, resume=resume,
                 ready=rate.begin, progress=rate.update, curve_progress=rate.follow,
             )  # fmt: skip
@@ -138,7 +149,7 @@ def _record(found: "Diagram", computed: int, seconds: float) -> dict[str, Any]:
         "scenario": found.scenario.name,
         "parameters": found.scenario.values(),
         "keys": [*found.request.grid.keys],
-        "states": [*found.request.states],
+        "states": [*found.request.labels],
         "points": found.points,
         "computed": computed,
         "converged": found.converged,

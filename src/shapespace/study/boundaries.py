@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from shapespace.analysis.bifurcation import SingularPoint
+from shapespace.analysis.bifurcation import Kind, SingularPoint
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, start_point
 from shapespace.analysis.stationary import Stationary
@@ -42,9 +42,13 @@ Progress = Callable[[Curve], None]
 
 
 class Change(NamedTuple):
-    """Neighbours between which states change in kind: `state` is one of `inside` that `outside` has none of."""
+    """Neighbours between which states change in kind: of one kind `inside` has more than `outside`, which are `states`.
 
-    state: int
+    is_pair: two states more, which a fold must end.
+    """
+
+    states: tuple[int, ...]
+    is_pair: bool
     inside: Index
     outside: Index
 
@@ -142,9 +146,10 @@ def _change(code: NDArray[np.int64], one: Index, other: Index) -> Change:
     for inside, outside in ((one, other), (other, one)):
         here = code[(slice(None), *inside)].tolist()
         surplus = Counter(here) - Counter(code[(slice(None), *outside)].tolist())
-        chosen = next((kind for kind in here if kind and surplus[kind]), None)
-        if chosen is not None:
-            return Change(here.index(chosen), inside, outside)
+        states = tuple(number for number, kind in enumerate(here) if kind and surplus[kind])
+        if states:
+            there = code[(slice(None), *outside)].tolist()
+            return Change(states, sum(map(bool, here)) - sum(map(bool, there)) == 2, inside, outside)
     raise ValueError(f"{one}, {other}: have states of the same kinds.")
 
 
@@ -173,8 +178,10 @@ def _unexplained(changes: Sequence[Change], diagram: Diagram, curves: Sequence[C
     if not changes or not curves:
         return [*changes]
     places = np.stack([change.middle for change in changes])
-    nearest = np.min([distances(places, curve, diagram) for curve in curves], axis=0)
-    return [change for change, distance in zip(changes, nearest, strict=True) if distance > NEAR]
+    near = np.stack([distances(places, curve, diagram) <= NEAR for curve in curves])
+    is_fold = np.array([curve.of == Kind.FOLD for curve in curves])
+    passed = {True: np.asarray(near[is_fold].any(axis=0)), False: np.asarray(near.any(axis=0))}
+    return [change for number, change in enumerate(changes) if not passed[change.is_pair][number]]
 
 
 def _curve_at(
@@ -209,17 +216,24 @@ def _point_at(store: DiagramStore, diagram: Diagram, change: Change, moved: int)
         at[moved] -= back * ahead
         if not 0 <= at[moved] < axis.count:
             break
-        state = find_state(store, diagram, change.state, (at[0], at[1]))
-        point = None if state is None else locate(state, (axis.key, other.key), moved, ahead * axis.step)
-        if point is not None:
-            return point
+        # The last ones are the likeliest: what a fold ends are, of several states, those of more energy.
+        for number in reversed(change.states):
+            state = find_state(store, diagram, number, (at[0], at[1]))
+            point = (
+                None
+                if state is None
+                else locate(state, (axis.key, other.key), moved, ahead * axis.step, change.is_pair)
+            )
+            if point is not None:
+                return point
     return None
 
 
-def locate(state: Stationary, keys: tuple[str, str], moved: int, cell: float) -> SingularPoint | None:
+def locate(state: Stationary, keys: tuple[str, str], moved: int, cell: float, is_fold: bool) -> SingularPoint | None:
     """The first fold or branch point on the branch of a state within a few cells of its value of the first key.
 
-    keys: the one that moves first, which is number `moved` of the state's. cell: the step towards where it is expected.
+    keys: the one that moves first, which is number `moved` of the state's. cell: the step towards where it is expected. is_fold:
+    no other point will do.
     """
     problem = state.problem
     assert isinstance(problem, KeyedProblem)
@@ -234,7 +248,8 @@ def locate(state: Stationary, keys: tuple[str, str], moved: int, cell: float) ->
         return None
     for one in traced(Continuation([first], (), options)):
         if isinstance(one, Located):
-            return one.point
-        if isinstance(one, Point) and not -1.0 <= (one.parameter - p[0]) / cell <= SEARCHED:
-            return None
+            if not is_fold or one.point.kind is Kind.FOLD:
+                return one.point
+        elif isinstance(one, Point) and not -1.0 <= (one.parameter - p[0]) / cell <= SEARCHED:
+            break
     return None

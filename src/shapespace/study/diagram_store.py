@@ -31,7 +31,7 @@ from shapespace.study.records import AbstractRecordStore, holds_store
 from shapespace.study.regimes import Regime
 from shapespace.study.scenario import Scenario
 
-OUTCOME, UNSTABLE, REGIME = "outcome", "n_unstable", "regime"
+OUTCOME, UNSTABLE, REGIME, COUNT = "outcome", "n_unstable", "regime", "n_states"
 _OUTCOMES = (
     Outcome.CONVERGED,
     Outcome.NO_STATE,
@@ -71,22 +71,35 @@ class Anchors:
 
 @dataclass(frozen=True)
 class DiagramRequest:
-    """What is asked for besides the scenario."""
+    """What is asked for besides the scenario.
+
+    states: names. branches: with more than none, up to so many states at each point, on all sheets that folds connect with those
+    named and those of the stores `origins`.
+    """
 
     grid: Grid
     states: tuple[str, ...]
     stability: bool
+    branches: int = 0
+    origins: tuple[str, ...] = ()
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Of the states at one point."""
+        return tuple(f"state-{number + 1}" for number in range(self.branches)) or self.states
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values."""
         axes = {name: asdict(axis) for name, axis in (("x", self.grid.x), ("y", self.grid.y))}
-        return {**axes, "states": [*self.states], "stability": self.stability}
+        more = {"branches": self.branches, "origins": [*self.origins]} if self.branches else {}
+        return {**axes, "states": [*self.states], "stability": self.stability, **more}
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """What `as_dict` described."""
         grid = Grid(Axis(**stored["x"]), Axis(**stored["y"]))
-        return cls(grid, tuple(stored["states"]), stored["stability"])
+        more = stored.get("branches", 0), tuple(stored.get("origins", ()))
+        return cls(grid, tuple(stored["states"]), stored["stability"], *more)
 
 
 class DiagramStore(AbstractRecordStore[Anchors]):
@@ -162,7 +175,7 @@ class DiagramStore(AbstractRecordStore[Anchors]):
             if (self.path / "zarr.json").exists():
                 return
             root = zarr.open_group(self.path, mode="a", zarr_format=3)
-            grid, states = self.request.grid, self.request.states
+            grid, states = self.request.grid, self.request.labels
             names = [*observables, *ABOUT_SOLUTION]
             for axis in (grid.x, grid.y):
                 coordinate = self._array(root, axis.key, (axis.key,), np.nan, "f8", (axis.count,), (axis.count,))
@@ -171,6 +184,8 @@ class DiagramStore(AbstractRecordStore[Anchors]):
             shape: tuple[int, ...]
             chunks: tuple[int, ...]
             dims, shape, chunks = grid.keys[::-1], grid.shape[::-1], (grid.y.edge, grid.x.edge)
+            if self.request.branches:
+                self._array(root, COUNT, dims, -1, "i2", shape, chunks)
             if len(states) > 1:
                 dims, shape, chunks = ("state", *dims), (len(states), *shape), (len(states), *chunks)
                 label = root.create_array(
@@ -214,6 +229,10 @@ class DiagramStore(AbstractRecordStore[Anchors]):
                 "flag_meanings": " ".join(one.words.replace(" ", "-") for one in Regime),
             }
             return {"long_name": "what the state is like; 0 where there is none", **masks}
+        if name == COUNT:
+            return {
+                "long_name": "number of states found; where there are more than are stored, those of least bending energy are"
+            }
         if name == UNSTABLE:
             return {"long_name": "number of growing modes"}
         if name in ABOUT_SOLUTION:
@@ -239,7 +258,7 @@ class DiagramStore(AbstractRecordStore[Anchors]):
             where = (..., y, x)
             for name in [*(set(values) - {OUTCOME}), OUTCOME]:
                 rows = values[name].swapaxes(1, 2)
-                root[name][where] = rows if len(self.request.states) > 1 else rows[0]
+                root[name][where] = rows if len(rows) > 1 else rows[0]
 
     @property
     def outcomes(self) -> NDArray[np.int8]:
@@ -284,13 +303,14 @@ class Diagram(Plotted):
 
     @property
     def points(self) -> int:
-        """Points of the grid, times states."""
-        return int(self.dataset[OUTCOME].size)
+        """Points of the grid, times the states that were named."""
+        return int(np.prod(self.request.grid.shape)) * (1 if self.request.branches else len(self.request.states))
 
     @property
     def converged(self) -> int:
-        """Points with a state."""
-        return int((self.dataset[OUTCOME] == CODES[Outcome.CONVERGED]).sum())
+        """Of these, those with a state."""
+        is_state = self.dataset[OUTCOME] == CODES[Outcome.CONVERGED]
+        return int((is_state.any("state") if self.request.branches > 1 else is_state).sum())
 
     @property
     def regimes(self) -> NDArray[np.int64]:
@@ -321,11 +341,14 @@ class Diagram(Plotted):
         codes = data[OUTCOME].transpose(..., y, x).to_numpy().reshape(-1, *self.request.grid.shape[::-1])
         names = {code: outcome for outcome, code in CODES.items()}
         is_failed = (codes != NOT_COMPUTED) & (codes != CODES[Outcome.CONVERGED])
+        if self.request.branches:
+            is_failed[1:] = False
+            is_failed[0] &= ~(codes == CODES[Outcome.CONVERGED]).any(axis=0)
         return [
             {
                 x: float(data[x][i]),
                 y: float(data[y][j]),
-                "state": self.request.states[s],
+                "state": self.request.labels[s],
                 "outcome": names[int(codes[s, j, i])].value,
                 "reason": names[int(codes[s, j, i])].advice,
             }

@@ -1,6 +1,6 @@
 """The points of one tile of a diagram, from the states in the middle of the tiles around: what a worker computes."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -9,15 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from shapespace.analysis.passage import is_symmetric
+from shapespace.analysis.sheets import spread_sheets, states_at
 from shapespace.analysis.stability import Spectrum
 from shapespace.analysis.stationary import Stationary
-from shapespace.analysis.sweeping import Index, Sweep
+from shapespace.analysis.sweeping import SIDES, Index, Sweep
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import Rate
 from shapespace.study.diagram_store import (
     ABOUT_SOLUTION,
     CODES,
+    COUNT,
     OUTCOME,
     REGIME,
     UNSTABLE,
@@ -51,18 +53,58 @@ def compute_tile(path: str | Path, tile: Tile) -> Done:
     """Compute a tile of a stored diagram and write it there. What it holds depends on the store's anchors alone."""
     start = perf_counter()
     store = DiagramStore.open(path)
-    surveys = [_survey(store, anchors, tile) for anchors in store]
-    values = {name: np.stack([one[name] for one in surveys]) for name in surveys[0]}
+    values = _all_sheets(store, tile) if store.request.branches else _named(store, tile)
     store.write_tile(tile, values)
     outcomes = values[OUTCOME]
     return Done(tile, outcomes.size, int((outcomes == CODES[Outcome.CONVERGED]).sum()), perf_counter() - start)
 
 
-def _survey(store: DiagramStore, anchors: Anchors, tile: Tile) -> dict[str, Array]:
-    """Arrays (n_x, n_y) of a tile's points, in one of the states."""
+def _named(store: DiagramStore, tile: Tile) -> dict[str, Array]:
+    """Arrays (states, n_x, n_y) of a tile's points: each state by its name."""
     surveyor = Surveyor(store.scenario, store.request.grid.keys, store.request.stability)
-    own = anchors.outcomes[store.request.grid.tiles.index(tile)]
-    return surveyor.survey(_sweep(store, surveyor, anchors, tile), own)
+    number, surveys = store.request.grid.tiles.index(tile), []
+    for anchors in store:
+        sweep = _sweep(store, surveyor, anchors, tile)
+        own = anchors.outcomes[number]
+        untried = own if own is not Outcome.CONVERGED else Outcome.NOT_REACHED
+        shape = sweep.values.shape[:2]
+        found = {at: [state] for at, state in sweep.found.items()}
+        surveys.append(surveyor.survey(shape, found, sweep.reasons, untried))
+    return {name: np.concatenate([one[name] for one in surveys]) for name in surveys[0]}
+
+
+def _all_sheets(store: DiagramStore, tile: Tile) -> dict[str, Array]:
+    """Arrays (branches, n_x, n_y) of a tile's points: all states known there, in the order of their bending energy."""
+    surveyor = Surveyor(store.scenario, store.request.grid.keys, store.request.stability)
+    sheets = _sheets(store, surveyor, tile)
+    shape = tuple(one.stop - one.start for one in store.request.grid.span(tile))
+    found = {at: states for at in np.ndindex(*shape) if (states := states_at(sheets, at))}
+    reasons = {at: reason for sheet in sheets for at, reason in sheet.reasons.items()}
+    survey = surveyor.survey(shape, found, reasons, Outcome.NO_STATE, store.request.branches)
+    count = np.zeros((1, *shape), np.int16)
+    for at, states in found.items():
+        count[(0, *at)] = len(states)
+    return survey | {COUNT: count}
+
+
+def _sheets(store: DiagramStore, surveyor: "Surveyor", tile: Tile) -> list[Sweep]:
+    """All sheets over a tile that its anchors, those of the tiles beside it and folds lead to."""
+    grid = store.request.grid
+    x, y = grid.span(tile)
+    values = grid.values(x, y)
+
+    def starts() -> Iterator[tuple[Index, Stationary]]:
+        for near in (tile, *((tile[0] + i, tile[1] + j) for i, j in SIDES)):
+            if near not in grid.tiles:
+                continue
+            number = grid.tiles.index(near)
+            i, j = int(grid.x.anchors[near[0]]), int(grid.y.anchors[near[1]])
+            at = min(max(i, x.start), x.stop - 1) - x.start, min(max(j, y.start), y.stop - 1) - y.start
+            for anchors in store:
+                if anchors.outcomes[number] is Outcome.CONVERGED:
+                    yield at, surveyor.state(anchors.meshes[number], anchors.xs[number], grid.values(i, j).reshape(2))
+
+    return spread_sheets(values, starts())
 
 
 def _sweep(store: DiagramStore, surveyor: "Surveyor", anchors: Anchors, tile: Tile) -> Sweep:
@@ -88,15 +130,17 @@ def _sweep(store: DiagramStore, surveyor: "Surveyor", anchors: Anchors, tile: Ti
 
 def find_state(store: DiagramStore, diagram: Diagram, number: int, at: Index) -> Stationary | None:
     """A state of the diagram at a grid point, computed again from the anchor of its tile; None where there is none."""
-    grid = store.request.grid
+    grid, is_strict = store.request.grid, store.request.branches > 0
     surveyor = Surveyor(store.scenario, grid.keys, stability=False)
-    tile, anchors = grid.tile_of(at), store.read(number)
+    tile = grid.tile_of(at)
     place = grid.tiles.index(tile)
     middle = int(grid.x.anchors[tile[0]]), int(grid.y.anchors[tile[1]])
-    if anchors.outcomes[place] is Outcome.CONVERGED:
+    for anchors in store if is_strict else [store.read(number)]:
+        if anchors.outcomes[place] is not Outcome.CONVERGED:
+            continue
         # Mostly a few points on the way are enough.
         low, high = np.minimum(at, middle), np.maximum(at, middle) + 1
-        sweep = Sweep(grid.values(*(slice(a, b) for a, b in zip(low, high, strict=True))))
+        sweep = Sweep(grid.values(*(slice(a, b) for a, b in zip(low, high, strict=True))), is_strict)
         start = middle[0] - int(low[0]), middle[1] - int(low[1])
         state = surveyor.state(anchors.meshes[place], anchors.xs[place], grid.values(*middle).reshape(2))
         if sweep.begin(start, state):
@@ -105,8 +149,9 @@ def find_state(store: DiagramStore, diagram: Diagram, number: int, at: Index) ->
         if found is not None and surveyor.is_stored(found, diagram, number, at):
             return found
     x, y = grid.span(tile)
-    found = _sweep(store, surveyor, anchors, tile).found.get((at[0] - x.start, at[1] - y.start))
-    return found if found is not None and surveyor.is_stored(found, diagram, number, at) else None
+    sweeps = _sheets(store, surveyor, tile) if is_strict else [_sweep(store, surveyor, store.read(number), tile)]
+    states = states_at(sweeps, (at[0] - x.start, at[1] - y.start))
+    return next((one for one in states if surveyor.is_stored(one, diagram, number, at)), None)
 
 
 def _around(tile: Tile) -> Iterator[Tile]:
@@ -137,36 +182,54 @@ class Surveyor:
         problem = replace(self._problem, base=self._problem.base.on_mesh(mesh))
         return Stationary(problem, x, q, Outcome.CONVERGED, 0.0, np.nan, 0, True)
 
-    def survey(self, sweep: Sweep, fallback: Outcome) -> dict[str, Array]:
-        """Arrays (n_x, n_y) by name. fallback: why there is no state where none was even tried."""
-        shape = sweep.values.shape[:2]
+    def survey(
+        self,
+        shape: tuple[int, ...],
+        found: Mapping[Index, Sequence[Stationary]],
+        reasons: Mapping[Index, Outcome],
+        untried: Outcome,
+        slots: int = 1,
+    ) -> dict[str, Array]:
+        """Arrays (slots, n_x, n_y) by name, states in the order of their bending energy.
+
+        reasons: why there is none, where one was tried; `untried` where none was.
+        """
         names = [*self.names, *ABOUT_SOLUTION, *([UNSTABLE] if self.stability else [])]
-        out: dict[str, Array] = {name: np.full(shape, np.nan) for name in names}
-        untried = fallback if fallback is not Outcome.CONVERGED else Outcome.NOT_REACHED
-        near: Spectrum | None = None
-        out[OUTCOME], out[REGIME] = np.zeros(shape, np.int8), np.zeros(shape, np.uint8)
+        out: dict[str, Array] = {name: np.full((slots, *shape), np.nan) for name in names}
+        out[OUTCOME], out[REGIME] = np.zeros((slots, *shape), np.int8), np.zeros((slots, *shape), np.uint8)
+        near: list[Spectrum | None] = [None] * slots
         for at in np.ndindex(*shape):
-            state = sweep.found.get(at)
-            if state is None:
-                out[OUTCOME][at] = CODES[sweep.reasons.get(at, untried)]
-                continue
-            assert isinstance(state.problem, KeyedProblem)
-            base, measured, count = state.problem.base, self._measured(state), None
-            end = shape_end(base, state.x)
-            out[OUTCOME][at] = CODES[end or Outcome.CONVERGED]
-            about = {"correction": state.correction, "iterations": state.iterations, "elements": base.elements}
-            values = self._in_units(state, measured) | about
-            if self.stability:
-                near = spectrum_at(state.problem, state.x, state.p, near=near)
-                count = near.n_unstable
-                values[UNSTABLE] = np.nan if count is None else count
-            if end is None:
-                has_image = state.problem.reflected(state.x) is not None
-                mirrors = is_symmetric(state.problem, state.x) if has_image else None
-                out[REGIME][at] = regime_of(mirrors, measured, count)
-            for name, value in values.items():
-                out[name][at] = value
+            out[OUTCOME][(slice(None), *at)] = CODES[reasons.get(at, untried)]
+            states = [(self._measured(state), state) for state in found.get(at, ())]
+            for slot, (measured, state) in enumerate(sorted(states, key=lambda one: one[0]["bending_energy"])[:slots]):
+                near[slot] = self._record(out, (slot, *at), state, measured, near[slot])
         return out
+
+    def _record(
+        self,
+        out: dict[str, Array],
+        at: tuple[int, ...],
+        state: Stationary,
+        measured: dict[str, float],
+        near: Spectrum | None,
+    ) -> Spectrum | None:
+        """Put a state into the arrays; its spectrum, where that is asked for, is returned to start the next one's."""
+        problem = state.problem
+        assert isinstance(problem, KeyedProblem)
+        end, count, spectrum = shape_end(problem.base, state.x), None, None
+        about = {"correction": state.correction, "iterations": state.iterations, "elements": problem.base.elements}
+        values = self._in_units(state, measured) | about
+        if self.stability:
+            spectrum = spectrum_at(problem, state.x, state.p, near=near)
+            count = spectrum.n_unstable
+            values[UNSTABLE] = np.nan if count is None else count
+        if end is None:
+            has_image = problem.reflected(state.x) is not None
+            out[REGIME][at] = regime_of(is_symmetric(problem, state.x) if has_image else None, measured, count)
+        out[OUTCOME][at] = CODES[end or Outcome.CONVERGED]
+        for name, value in values.items():
+            out[name][at] = value
+        return spectrum
 
     def is_stored(self, state: Stationary, diagram: Diagram, number: int, at: Index) -> bool:
         """Whether a state is that of a diagram."""

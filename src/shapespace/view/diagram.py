@@ -40,7 +40,7 @@ def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
     if name not in names:
         raise InputError(f"{name}: is no observable of this diagram; choose one of {', '.join(names)}.")
     values = data[name].where(is_state).transpose(..., y, x)
-    maps = [values] if "state" not in values.dims else [values.sel(state=one) for one in diagram.request.states]
+    maps = [values] if "state" not in values.dims else [values.sel(state=one) for one in diagram.request.labels]
     outcomes = data[OUTCOME].transpose(..., y, x).to_numpy().reshape(len(maps), *values.shape[-2:])
     norm, colours = _scale(name, values.to_numpy())
     with style.house_style():
@@ -48,7 +48,7 @@ def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
         figure = Figure(figsize=(width * style.MM, HEIGHT_MM * style.MM), layout="constrained")
         FigureCanvasAgg(figure)
         panels = figure.subplots(1, len(maps), squeeze=False, sharey=True)[0]
-        for axes, one, codes, state in zip(panels, maps, outcomes, diagram.request.states, strict=True):
+        for axes, one, codes, state in zip(panels, maps, outcomes, diagram.request.labels, strict=True):
             image = axes.pcolormesh(data[x], data[y], one, norm=norm, cmap=colours, rasterized=True)
             _mark_missing(axes, data[x].to_numpy(), data[y].to_numpy(), codes)
             draw_boundaries(axes, diagram)
