@@ -94,6 +94,7 @@ def test_json_is_the_last_line_with_numbers_only_where_there_are_some(shell: She
     assert record["observables"]["pressure"] == 20.5
     assert "polarity" not in record["observables"]
     assert all(type(value) in (int, float) for value in record["observables"].values())
+    assert parameters.pop("parameterization") == "sle"
     assert all(type(value) in (int, float, bool) for value in parameters.values())
     assert len(RunStore.open(record["store"])) == STEPS + 1
 

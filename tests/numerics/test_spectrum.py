@@ -44,7 +44,7 @@ class Linear(AbstractSystem):
         rows = [dy[:n] - y[n:], p[0] * dy[n:] + force + multiplier - dq]
         return jnp.concatenate([*rows, a - reaction] if self.algebraic else rows)
 
-    def stored(self, y: Traced, s: Traced) -> Traced:
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
         return y[: len(self.fields) // 2]
 
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:

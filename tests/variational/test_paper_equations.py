@@ -168,15 +168,15 @@ def compiled(kind: str) -> Callable[..., dict[str, Any]]:
         (force, _), (_, fluxes) = jax.jvp(lambda *x: system.variation(*x, p), here, ahead)
         found = {"rows": system.equations(*here, u, p), "force": force}
         found["balance"] = jax.tree.map(jnp.subtract, fluxes, force)
-        dy, y, _, s, dq = here
+        dy, y, a, s, dq = here
         found["ends"] = system.end_conditions(y, y, s, dq, dq, p)
         if system.species is not None:
             species = system.species(system.named(p))
 
-            def carried(dy: Traced, y: Traced, _: Traced, s: Traced, dq: Traced) -> Traced:
-                return species.flux(system.site(dy, y, s, dq), system.field_values(dy)["c"])
+            def carried(dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced) -> Traced:
+                return species.flux(system.site(dy, y, a, s, dq), system.field_values(dy)["c"])
 
-            source = species.source(system.site(dy, y, s, dq), u)
+            source = species.source(system.site(dy, y, a, s, dq), u)
             found["species"] = jax.jvp(carried, here, ahead)[1] + dq[4] - source
         return found
 

@@ -98,6 +98,7 @@ QUANTITIES: dict[str, Quantity] = {
     "degree": Quantity("k_G", "Gauss points per element", _NUMBER),
     "mesh_tolerance": Quantity("tol_u", "relative discretisation error aimed at", _NUMBER),
     "azimuthal_flow": Quantity("v_phi", "switch that makes the azimuthal flow an unknown", _NUMBER),
+    "parameterization": Quantity("q^u", "how the mesh follows the surface: sle, eulerian or lagrangian", _NUMBER),
     # observables
     "time": Quantity("t", "time", _TIME),
     "height": Quantity("d", "height z(0) - z(1)", _LENGTH),

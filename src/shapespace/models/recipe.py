@@ -34,7 +34,7 @@ class Recipe:
     material_area: bool = False
     laws: tuple[Law, ...] = ()
 
-    def system(self, azimuthal: bool = False) -> SurfaceSystem:
+    def system(self, azimuthal: bool = False, parameterization: str = "sle") -> SurfaceSystem:
         """The surface, with or without azimuthal flow as an unknown."""
         swirl = {"v_phi": self.ends.get("v_phi", (Pinned(), Pinned()))} if azimuthal else {}
         ends = {name: pair for name, pair in self.ends.items() if name != "v_phi"}
@@ -46,6 +46,7 @@ class Recipe:
             species_count=self.species_count,
             storages=self.storages,
             turning=self.turning,
+            parameterization=parameterization,
             incompressible=self.incompressible,
             fixed_volume=self.fixed_volume,
             fixed_area=self.fixed_area,

@@ -39,8 +39,10 @@ class Numbers(NamedTuple):
 @cache
 def numbers(system: AbstractSystem) -> Numbers:
     """As the system's functions return them."""
-    y, s, p = (jnp.zeros(len(names)) for names in (system.fields, system.scalars, system.parameters))
-    return Numbers(jax.eval_shape(system.stored, y, s).shape[0], jax.eval_shape(system.targets, s, p).shape[0])
+    y, a, s, p = (
+        jnp.zeros(len(names)) for names in (system.fields, system.algebraic, system.scalars, system.parameters)
+    )
+    return Numbers(jax.eval_shape(system.stored, y, a, s).shape[0], jax.eval_shape(system.targets, s, p).shape[0])
 
 
 class Tile(NamedTuple):
@@ -91,20 +93,27 @@ def _at_point(
 ) -> Traced:
     """Equations and integrands at one point as a function of its row v and the scalars s."""
     dy, a, y = _split_row(system, v)
-    dq = coefficient * system.stored(y, s) + history
+    dq = coefficient * system.stored(y, a, s) + history
     return jnp.concatenate([system.equations(dy, y, a, s, dq, u, p), system.integrands(dy, y, a, s, u, p)])
 
 
 def _at_ends(system: AbstractSystem, ends: Traced, s: Traced, tile: Tile) -> Traced:
     """End conditions."""
-    dq0, dq1 = (tile.coefficient * system.stored(ends[i], s) + tile.end_history[i] for i in (0, 1))
+    none = jnp.zeros(len(system.algebraic))
+    dq0, dq1 = (tile.coefficient * system.stored(ends[i], none, s) + tile.end_history[i] for i in (0, 1))
     return system.end_conditions(ends[0], ends[1], s, dq0, dq1, tile.p)
 
 
 def _stored_at(system: AbstractSystem, rows: Traced, scalars: Traced, ends: Traced) -> tuple[Traced, Traced]:
     """q at the points (n_q, T) and at both ends (2, n_q)."""
-    inner = jax.vmap(lambda v: system.stored(_split_row(system, v)[2], scalars), in_axes=-1, out_axes=-1)(rows)
-    return inner, jnp.stack([system.stored(ends[i], scalars) for i in (0, 1)])
+
+    def at(v: Traced) -> Traced:
+        _, a, y = _split_row(system, v)
+        return system.stored(y, a, scalars)
+
+    none = jnp.zeros(len(system.algebraic))
+    inner = jax.vmap(at, in_axes=-1, out_axes=-1)(rows)
+    return inner, jnp.stack([system.stored(ends[i], none, scalars) for i in (0, 1)])
 
 
 def _values_at(system: AbstractSystem, tile: Tile) -> Values:
@@ -175,7 +184,7 @@ def _densities(system: AbstractSystem, density: Density, packed: Traced) -> dict
     def at(v: Traced, q: Traced) -> dict[str, Traced]:
         dy, a, y = _split_row(system, v)
         s = tile.scalars
-        return density(system, dy, y, a, s, tile.coefficient * system.stored(y, s) + q, tile.p)
+        return density(system, dy, y, a, s, tile.coefficient * system.stored(y, a, s) + q, tile.p)
 
     return jax.vmap(at, in_axes=-1)(tile.rows, tile.history)
 

@@ -26,7 +26,7 @@ class AbstractSystem(eqx.Module):
     """First-order system F(y', y, a, s, dq/dt; u, p) = 0 with end and integral conditions.
 
     y: differential fields (n,), continuous in u; a: algebraic fields (n_a,), known between the ends only; s: scalars
-    (n_s,); q(y, s): stored quantities (n_q,). Conditions: n_b at the ends and n_i integrals with n_b + n_i = n + n_s.
+    (n_s,); q(y, a, s): stored quantities (n_q,). Conditions: n_b at the ends and n_i integrals with n_b + n_i = n + n_s.
     """
 
     fields: eqx.AbstractVar[tuple[str, ...]]
@@ -44,8 +44,8 @@ class AbstractSystem(eqx.Module):
         """n + n_a residuals at one interior point."""
 
     @abstractmethod
-    def stored(self, y: Traced, s: Traced) -> Traced:
-        """q (n_q,) at one point."""
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
+        """q (n_q,) at one point; at the ends, where a is not known, it comes as zeros."""
 
     @abstractmethod
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:

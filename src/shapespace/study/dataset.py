@@ -123,7 +123,8 @@ def _fields(engine: Engine, frame: Frame) -> dict[str, Array]:
     u = even_points(frame.mesh, POINTS)
     y = dict(zip(system.fields, state.values(u).T, strict=True))
     dpsi = state.derivatives(u)[:, system.fields.index("psi")]
-    h = frame.scalars[0]
+    is_even = "h" in system.scalars
+    h = frame.scalars[0] if is_even else state.algebraic_values(u)[:, system.algebraic.index("h")]
     # At the poles the azimuthal curvature tends to the meridional one; the first and last points are the poles or the rim.
     at_axis = np.array([(i in (0, POINTS - 1) and "p" in system.scalars) or i == 0 for i in range(POINTS)])
     azimuthal = np.where(at_axis, dpsi / h, np.sin(y["psi"]) / np.where(at_axis, 1.0, y["r"]))

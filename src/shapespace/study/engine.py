@@ -37,12 +37,12 @@ def recipe_of(model: str) -> Recipe:
 
 
 @cache
-def _system(recipe: Recipe, azimuthal: bool) -> SurfaceSystem:
+def _system(recipe: Recipe, azimuthal: bool, parameterization: str) -> SurfaceSystem:
     """Made once: functions are compiled for each system anew, but those of shipped models are kept."""
-    system = recipe.system(azimuthal)
+    system = recipe.system(azimuthal, parameterization)
     for name, shipped in _RECIPES.items():
         if recipe is shipped:
-            name_system(system, f"{name}, azimuthal: {azimuthal}")
+            name_system(system, f"{name}, azimuthal: {azimuthal}, {parameterization}")
     return system
 
 
@@ -78,7 +78,7 @@ class Engine:
     def of(cls, scenario: Scenario) -> "Engine":
         """The engine of a scenario on its initial, uniform mesh."""
         numerics = scenario.numerics
-        system = _system(recipe_of(scenario.model), numerics.azimuthal_flow)
+        system = _system(recipe_of(scenario.model), numerics.azimuthal_flow, numerics.parameterization)
         values = {"rotation_rate": 0.0, **scenario.dimensionless()}
         if scenario.kind == "closed-surface":
             values["enclosed_volume"] = BALL * values["sphere_radius"] ** 3
@@ -86,6 +86,11 @@ class Engine:
             values["enclosed_volume"] = BALL * values["area_radius"] ** 3 * values["reduced_volume"]
             values["surface_area"] = 4.0 * np.pi * values["area_radius"] ** 2
             values["initial_oblate"] = float(scenario.values()["initial_oblate"])
+        if (choice := numerics.parameterization) != "sle" and values.get("ring_amplitude", 0.0) != 0.0:
+            raise InputError(
+                f"parameterization = {choice!r}: the ring of the reference concentration lies at u = 1/2, which is the middle of "
+                "the surface for sle only; give ring_amplitude=0 or parameterization=sle."
+            )
         _admit(recipe_of(scenario.model), tuple(values.items()))
         p = np.array([values[name] for name in system.parameters])
         mesh = uniform_mesh(numerics.elements)
@@ -118,8 +123,9 @@ class Engine:
         scalars = np.array([known.get(name, 0.0) for name in self.system.scalars])
         values = self._columns(functions(mesh)[0] | self._amounts(mesh, functions(mesh)[0]))
         slopes = self._columns(functions(stages)[1] | self._amounts(stages, functions(stages)[1], slope=True))
-        tension = self.values.get("boundary_tension", known.get("sigma", 0.0))
-        algebraic = np.full((*stages.shape, len(self.system.algebraic)), tension)
+        known["gamma"] = self.values.get("boundary_tension", known.get("sigma", 0.0))
+        even = np.array([known[name] for name in self.system.algebraic])
+        algebraic = np.broadcast_to(even, (*stages.shape, len(even))).copy()
         return state_from_functions(mesh, self.problem.degree, values, slopes, algebraic, scalars)
 
     def _columns(self, functions: dict[str, Array]) -> Array:

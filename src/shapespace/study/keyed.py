@@ -86,7 +86,11 @@ class KeyedProblem(AbstractSmoothProblem):
 
     @classmethod
     def of(cls, scenario: Scenario, keys: tuple[str, ...]) -> "KeyedProblem":
-        """On the scenario's initial mesh."""
+        """On the scenario's initial mesh. InputError where the mesh moves with the surface, so that it has no state at rest."""
+        if (mesh := scenario.numerics.parameterization) != "sle":
+            raise InputError(
+                f"parameterization = {mesh!r}: a stationary state has no such mesh; give parameterization=sle."
+            )
         return cls(Engine.of(scenario).problem, keys, make_powers(scenario, keys))
 
     def surface(self, x: Array) -> Array:

@@ -11,7 +11,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
-from typing import Any, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, cast, get_origin
 
 from shapespace.base.errors import InputError
 from shapespace.base.scales import QUANTITIES
@@ -32,7 +32,7 @@ from shapespace.study.parameters import (
 MAIN_KEYS = {"closed-surface": "peclet", "open-membrane": "spontaneous_curvature", "vesicle": "reduced_volume"}
 """By kind of model, the key of a problem that need not vary any, and in which a branch is proposed."""
 
-Value = float | int | bool
+Value = float | int | bool | str
 Keys = Mapping[str, Value]
 Formula = Callable[[Mapping[str, float]], float]
 
@@ -133,9 +133,16 @@ def check_key(key: str, value: object, model: str) -> None:
         )
 
 
+def is_word(key: str, model: str) -> bool:
+    """Whether a key's values are words."""
+    return get_origin(MODELS[model].type_of(key)) is Literal
+
+
 def typed(key: str, value: object, model: str) -> Value:
-    """A value as plain Python number or bool; text is read as the key's type. InputError where it cannot be."""
+    """A value as plain Python number, bool or word; text is read as the key's type. InputError where it cannot be."""
     if isinstance(value, str):
+        if is_word(key, model):
+            return value.strip()
         return _read_text(key, value, MODELS[model].type_of(key))
     # NumPy's numbers are numbers; its bool_ has no place in numbers.Real and is left to fail the check.
     if isinstance(value, bool) or not isinstance(value, Real):

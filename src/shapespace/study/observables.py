@@ -38,7 +38,7 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
     first, last = state.nodes[0], state.nodes[-1]
     out = {
         "height": first[column["z"]] - last[column["z"]],
-        "length": scalars["h"],
+        "length": integrals["length"],
         "equator_radius": float(state.field(column["r"], np.array([0.5]))[0]),
         "max_meridional_curvature": peaks["curvature"],
         **{name: integrals[name] for name in ("area", "bending_energy", "energy")},
@@ -91,7 +91,10 @@ def _closed(
     state: State, column: dict[str, int], integrals: dict[str, float], scalars: dict[str, float]
 ) -> dict[str, float]:
     """Observables that only a closed surface has."""
-    poles = state.derivatives(np.array([0.0, 1.0]))[:, column["psi"]]
+    ends = np.array([0.0, 1.0])
+    poles = state.derivatives(ends)[:, column["psi"]]
+    if "h" not in scalars:
+        poles = poles / state.algebraic_values(ends)[:, -1]
     area, volume = integrals["area"], integrals["volume"]
     return {
         "volume": volume,

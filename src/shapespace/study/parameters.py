@@ -1,7 +1,7 @@
 """The records of a scenario: every key with its type and the bounds it must meet, checked where the record is made."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
@@ -133,6 +133,7 @@ class Numerics(Record):
     elements: Annotated[int, AfterValidator(_is_element_count)] = 40
     degree: Annotated[int, Field(ge=2, le=6)] = 4
     mesh_tolerance: Positive = 1e-5
+    parameterization: Literal["sle", "eulerian", "lagrangian"] = "sle"
     azimuthal_flow: bool = False
 
 
@@ -145,6 +146,7 @@ _MUST = {
     "float_type": "must be a number (and not quoted)",
     "int_type": "must be a whole number",
     "bool_type": "must be true or false",
+    "literal_error": "must be {expected}",
     "extra_forbidden": "is not a key of this record",
 }
 

@@ -15,7 +15,7 @@ from typing import Any, Self
 
 from shapespace.base.errors import InputError
 from shapespace.base.scales import Scales
-from shapespace.study.keys import MODELS, Value, check_key, make_parameters, nearest, replace_keys, twin_values
+from shapespace.study.keys import MODELS, Value, check_key, is_word, make_parameters, nearest, replace_keys, twin_values
 from shapespace.study.parameters import (
     ClosedSurfaceInitial,
     ClosedSurfaceParameters,
@@ -38,6 +38,8 @@ FREE_ON_RESUME = ("until", "max_steps")
 _NAMES = ("guided-division", "ring-slipping", "polar-swimmer", "membrane-protrusion", "vesicle")
 TEMPLATES: dict[str, str] = {}
 """The TOML texts of scenarios that users defined, by name."""
+LATER = ("parameterization",)
+"""Keys that files may leave out, as they came after the first files were written."""
 _SECTIONS = ("parameters", "initial", "run", "numerics")
 
 
@@ -217,7 +219,7 @@ def _from_text(text: str) -> Scenario:
     known = MODELS[model]
     for key, section in known.section_of.items():
         rival = known.rival_of(key)
-        if key not in known.twins and key not in keys and rival not in keys:
+        if key not in (*known.twins, *LATER, *keys) and rival not in keys:
             either = f"{key} (or {rival})" if rival else key
             raise InputError(f"{either}: is missing from [{section}]; the file is cut short or incomplete: add it.")
     return Scenario.from_keys(name, model, keys)
@@ -245,6 +247,6 @@ def _check_section(section: str, entries: object, model: str) -> None:
         if section_of[key] != section:
             raise InputError(f"{key} = {shown(value)}: stands in [{section}]; move it under [{section_of[key]}].")
         # Text in a file is a slip (`peclet = "450"`); only the command line's text is read as a number.
-        if isinstance(value, str):
+        if isinstance(value, str) and not is_word(key, model):
             must = {float: "a number", int: "a whole number", bool: "true or false"}[MODELS[model].type_of(key)]
             raise InputError(complaint(key, value, f"must be {must}, without quotes"))

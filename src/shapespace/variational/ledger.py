@@ -27,8 +27,7 @@ def densities(
     system: SurfaceSystem, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, p: Traced
 ) -> dict[str, Traced]:
     """Densities per du of area, volume, energies, powers, amounts; `curvature` = |C_u^u| serves for its largest value."""
-    del a  # multipliers do no work
-    site = system.site(dy, y, s, dq)
+    site = system.site(dy, y, a, s, dq)
     g, terms = site.geometry, system.terms(system.named(p))
     element = 2.0 * jnp.pi * area_element(g)
     energies = [term for term in terms if isinstance(term, AbstractEnergy)]
@@ -36,6 +35,7 @@ def densities(
     forces = [term for term in terms if isinstance(term, AxialForce)]
     zero = jnp.zeros(())
     found = {
+        "length": g.h,
         "area": element,
         "volume": volume_element(g),
         "energy": sum((term.density(g, site.concentration) * element for term in energies), start=zero),

@@ -10,7 +10,7 @@ import jax.numpy as jnp
 
 from shapespace.base.arrays import Traced
 from shapespace.geometry.curve import Geometry, area_element, tangent_slopes, volume_element
-from shapespace.geometry.motion import Rates, divergence, turning_rate
+from shapespace.geometry.motion import Rates, divergence, normal_velocity, turning_rate
 from shapespace.numerics.system import AbstractSystem, Symmetry
 from shapespace.physics.force import Pressure
 from shapespace.physics.species import Species
@@ -68,6 +68,9 @@ class SurfaceSystem(AbstractSystem):
     turning and its flux. Algebraic: gamma_H if incompressible. Scalars: h, then p if the volume is fixed, sigma (or dilation) if
     the total area is, and v0 if the frame moves along. z is measured in that frame. Stored: r, z, psi, h and the amounts c r h.
     storages: of what is held elastically, the energy law by its multiplier.
+
+    parameterization (Table 1): "sle", h a scalar; "eulerian" or "lagrangian", h algebraic with dh/dt = psi' v_n, or (v_u)' +
+    psi' v_n, plus slip h, where the scalar slip, zero but for errors, keeps r(1) = 0, which both would have on their own.
     """
 
     fields: tuple[str, ...] = eqx.field(static=True)
@@ -78,6 +81,7 @@ class SurfaceSystem(AbstractSystem):
     species: SpeciesFactory | None = eqx.field(static=True)
     storages: tuple[tuple[str, Callable[[Any], AbstractStorage]], ...] = eqx.field(static=True)
     ends: tuple[tuple[str, Any, Any], ...] = eqx.field(static=True)
+    parameterization: str = eqx.field(static=True, default="sle")
 
     @property
     def symmetry(self) -> Symmetry | None:
@@ -119,14 +123,18 @@ class SurfaceSystem(AbstractSystem):
         """Scalars by name."""
         return {name: s[i] for i, name in enumerate(self.scalars)}
 
-    def stored(self, y: Traced, s: Traced) -> Traced:
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
         """(r, z, psi, h[, c r h])."""
-        f, h = self.field_values(y), s[self.scalars.index("h")]
+        f, h = self.field_values(y), self.stretch(a, s)
         quantities = [f["r"], f["z"], f["psi"], h]
         quantities += [f[name] * f["r"] * h for name in ("c", "c_2") if name in f]
         return jnp.stack(quantities)
 
-    def site(self, dy: Traced, y: Traced, s: Traced, dq: Traced) -> Site:
+    def stretch(self, a: Traced, s: Traced) -> Traced:
+        """h: the same everywhere in the scaling (SLE) parameterization, a field in others."""
+        return a[self.algebraic.index("h")] if "h" in self.algebraic else s[self.scalars.index("h")]
+
+    def site(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced) -> Site:
         """The state of motion at one point."""
         f, df, scalar = self.field_values(y), self.field_values(dy), self.scalar_values(s)
         zero = jnp.zeros(())
@@ -135,21 +143,21 @@ class SurfaceSystem(AbstractSystem):
         )
         # The density is linear in the gradients of dr/dt, dz/dt, dpsi/dt, dh/dt, so their values do not matter.
         gradients = Rates(zero, zero, zero, zero, df["v"], df.get("v_phi", zero), df.get("turning", zero))
-        geometry = Geometry(f["r"], f["psi"], df["psi"], scalar["h"], f.get("area", zero))
+        geometry = Geometry(f["r"], f["psi"], df["psi"], self.stretch(a, s), f.get("area", zero))
         return Site(geometry, rates, gradients, f.get("c", zero), df.get("c", zero), f.get("c_2", zero))
 
     def all_terms(self, a: Traced, s: Traced, p: Traced) -> tuple[AbstractTerm, ...]:
         """The model's terms and those of the constraints, whose multipliers are unknowns."""
         scalar = self.scalar_values(s)
         terms = (*self.terms(self.named(p)), *(term(scalar[name]) for name in self.held if (term := HELD[name].term)))
-        if self.algebraic:
+        if "gamma" in self.algebraic:
             terms = (*terms, Incompressibility(a[0]))
         return terms
 
     def variation(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, p: Traced) -> Variation:
         """dR/dw and dR/dw' at one point."""
         f = self.field_values(y)
-        site = self.site(dy, y, s, dq)
+        site = self.site(dy, y, a, s, dq)
         terms, multipliers = self.all_terms(a, s, p), Multipliers(f["alpha"], f["beta"])
         found = variation(terms, multipliers, site)
         if "turning" in f:
@@ -161,7 +169,7 @@ class SurfaceSystem(AbstractSystem):
     def equations(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, u: Traced, p: Traced) -> Traced:
         """Geometric relations, P' = dR/dw, definitions of the fluxes, species balance, constraints; one row per unknown."""
         f, df = self.field_values(y), self.field_values(dy)
-        site = self.site(dy, y, s, dq)
+        site = self.site(dy, y, a, s, dq)
         force, flux = self.variation(dy, y, a, s, dq, p)
         dr, dz = tangent_slopes(site.geometry)
         rows = [
@@ -184,9 +192,14 @@ class SurfaceSystem(AbstractSystem):
         rows += self._species_balances(dy, y, dq, u, p, site)
         if "area" in f:
             rows.append(df["area"] - area_element(site.geometry))
-        if self.algebraic:
+        if "gamma" in self.algebraic:
             dilation = self.scalar_values(s).get("dilation", jnp.zeros(()))
             rows.append(divergence(site.geometry, site.rates, site.gradients) - dilation)
+        if "h" in self.algebraic:
+            w, slip = site.rates, self.scalar_values(s)["slip"]
+            carried = site.gradients.meridional_velocity if self.parameterization == "lagrangian" else 0.0
+            stretching = carried + site.geometry.dpsi * normal_velocity(site.geometry, w)
+            rows.append(dq[3] - stretching - slip * site.geometry.h)
         return jnp.stack(rows)
 
     def species_laws(self, p: Traced) -> tuple[Species, ...]:
@@ -222,7 +235,7 @@ class SurfaceSystem(AbstractSystem):
     def _traction(self, tension: Traced, y: Traced, s: Traced, dq: Traced, p: Traced) -> Traced:
         """P_v at an end for a given tension there, on an incompressible surface (div v = 0 fixes v')."""
         dy = jnp.zeros_like(y)
-        site = self.site(dy, y, s, dq)
+        site = self.site(dy, y, tension[None], s, dq)
         v_slope = -site.geometry.h * divergence(site.geometry, site.rates, site.gradients)
         dy = dy.at[self.fields.index("v")].set(v_slope)
         return self.variation(dy, y, tension[None], s, dq, p).flux.meridional_velocity
@@ -248,7 +261,7 @@ class SurfaceSystem(AbstractSystem):
 
     def integrands(self, dy: Traced, y: Traced, a: Traced, s: Traced, u: Traced, p: Traced) -> Traced:
         """The elements of what is held: volume, area."""
-        geometry = self.site(dy, y, s, jnp.zeros(6)).geometry
+        geometry = self.site(dy, y, a, s, jnp.zeros(6)).geometry
         return jnp.array([HELD[name].element(geometry) for name in self.held])
 
     def targets(self, s: Traced, p: Traced) -> Traced:
@@ -276,6 +289,7 @@ def make_surface_system(
     species_count: int = 1,
     storages: Mapping[str, Callable[[Any], AbstractStorage]] | None = None,
     turning: bool = False,
+    parameterization: str = "sle",
     incompressible: bool = False,
     fixed_volume: bool = False,
     fixed_area: bool = False,
@@ -318,7 +332,12 @@ def make_surface_system(
             f"storages: {astray[0]} is no multiplier of this surface, which has {', '.join(multipliers) or 'none'}; an "
             "elastic area needs fixed_area and a surface that is not incompressible, an elastic volume fixed_volume."
         )
-    scalars = ("h", *multipliers, *(["v0"] if comoving else []))
+    if parameterization != "sle" and not comoving:
+        raise ValueError(
+            f"parameterization = {parameterization!r}: is for closed surfaces; at a rim matter leaves the mesh. Use 'sle'."
+        )
+    length = "h" if parameterization == "sle" else "slip"
+    scalars = (length, *multipliers, *(["v0"] if comoving else []))
     check_ends(ends, tuple(rates))
     if not incompressible and any(isinstance(end, Traction) for pair in ends.values() for end in pair):
         raise ValueError("a Traction end needs an incompressible surface; use Free or Pinned.")
@@ -328,7 +347,8 @@ def make_surface_system(
     check_count(len(fields), scalars, conditions, [HELD[name].parameter for name in multipliers])
     return SurfaceSystem(
         fields=tuple(fields),
-        algebraic=("gamma",) if incompressible else (),
+        algebraic=("gamma",) * incompressible + ("h",) * (parameterization != "sle"),
+        parameterization=parameterization,
         scalars=scalars,
         parameters=parameters,
         terms=terms,

@@ -40,7 +40,7 @@ class SecondOrder(AbstractSystem):
         bend = (self.dimension - 1) / x * y[1] if self.dimension > 1 else 0.0
         return jnp.stack([dy[0] - self.length * y[1], dy[1] + self.length * (bend + self.forcing(x, y[0], p) - dq[0])])
 
-    def stored(self, y: Traced, s: Traced) -> Traced:
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
         return y[:1]
 
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:
@@ -64,7 +64,7 @@ class MeanFree(AbstractSystem):
     def equations(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, u: Traced, p: Traced) -> Traced:
         return jnp.stack([dy[0] - y[1], dy[1] + p[0] * jnp.exp(y[0]) - dq[0]])
 
-    def stored(self, y: Traced, s: Traced) -> Traced:
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
         return y[:1]
 
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:
