@@ -30,7 +30,11 @@ def full_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.usefixtures("own_models")
-@pytest.mark.parametrize("name", NAMES)
+QUICK = [pytest.param(name, marks=pytest.mark.slow) if name in {"fig_7c"} else name for name in NAMES]
+"""One takes minutes in its quick form too."""
+
+
+@pytest.mark.parametrize("name", QUICK)
 def test_quick(name: str, quick_out: Path):
     assert_holds(name, quick_out, quick=True)
 
