@@ -71,6 +71,13 @@ def test_a_store_is_read_without_the_package():
 
 
 @pytest.mark.usefixtures("short", "own_models")
+@pytest.mark.parametrize(("page", "picture"), [("add-a-species", "pattern"), ("add-an-end-condition", "hinged")])
+def test_species_and_end_conditions_can_be_added_as_the_pages_say(page: str, picture: str):
+    run_blocks(ROOT / "docs" / "how-to" / f"{page}.md")
+    assert {path.name for path in Path().glob("*.png")} == {f"{picture}.png"}
+
+
+@pytest.mark.usefixtures("short", "own_models")
 def test_a_term_can_be_added_as_the_page_says():
     run_blocks(ROOT / "docs" / "how-to" / "add-a-term.md")
     assert {path.name for path in Path().glob("*.png")} == {"elastic-swimmer.png", "elastic-swimmer-budget.png"}
