@@ -11,10 +11,10 @@ from shapespace.study.engine import Engine
 
 
 def test_one_trajectory_on_three_meshes():
-    """Length, height, volume and speed at one time; the mesh that follows the matter stretches most."""
+    """Length, height, volume and speed at one time; the other two meshes stretch."""
     found, ratios = {}, {}
     for name in ("sle", "eulerian", "lagrangian"):
-        case = ss.scenario("polar-swimmer", seed_amplitude=0.3, until=0.05, parameterization=name, time_tolerance=1e-6)
+        case = ss.scenario("polar-swimmer", seed_amplitude=0.3, until=0.03, parameterization=name, time_tolerance=1e-6)
         run = ss.run(case)
         assert run.outcome is Outcome.REACHED_END
         found[name] = run.observables
@@ -27,7 +27,7 @@ def test_one_trajectory_on_three_meshes():
             allowed = {"abs": 1e-4} if key == "polarity" else {"rel": 2e-4}
             assert found[name][key] == pytest.approx(found["sle"][key], **allowed), (name, key)
         assert found[name]["volume"] == pytest.approx(found["sle"]["volume"], rel=1e-9)
-    assert 1.0 < ratios["eulerian"] < ratios["lagrangian"]
+    assert min(ratios["eulerian"], ratios["lagrangian"]) > 1.5 > ratios["sle"] == 1.0
 
 
 @pytest.mark.parametrize("name", ["eulerian", "lagrangian"])
