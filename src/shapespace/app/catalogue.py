@@ -2,11 +2,13 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from shapespace.app.source import AbstractSource
 from shapespace.base.errors import InputError, StoreError
 from shapespace.study.records import noun_of
+
+if TYPE_CHECKING:
+    from shapespace.app.source import AbstractSource
 
 Answer = dict[str, Any]
 
@@ -20,7 +22,7 @@ class Catalogue:
         self.paths = [*paths]
         self._sources: list[AbstractSource | None] = [None for _ in paths]
 
-    def source(self, number: int) -> AbstractSource:
+    def source(self, number: int) -> "AbstractSource":
         """A store by number. StoreError where it is none, or of a kind that is not known."""
         known = self._sources[number]
         if known is None:
@@ -55,7 +57,7 @@ class Catalogue:
         except InputError as error:
             return {**about, "error": str(error)}
 
-    def _asked(self, asked: Mapping[str, str]) -> AbstractSource:
+    def _asked(self, asked: Mapping[str, str]) -> "AbstractSource":
         number = _number(asked, "store")
         if not number < len(self.paths):
             raise InputError(f"store {number}: there are {len(self.paths)}.")
@@ -74,7 +76,7 @@ class Catalogue:
         return source
 
 
-def _source(path: Path) -> AbstractSource:
+def _source(path: Path) -> "AbstractSource":
     noun = noun_of(path)
     if noun == "diagram":
         # Imported late, as the library of arrays on disk loads slowly.

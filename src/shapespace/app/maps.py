@@ -17,12 +17,12 @@ from shapespace.study.curve_store import Curve, outline
 from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, OUTCOME, REGIME, UNSTABLE, Diagram, DiagramStore
 from shapespace.study.files import storage
 from shapespace.study.frame import Array, Frame
-from shapespace.study.modes import Modes
 from shapespace.study.scenario import Scenario
 from shapespace.study.telling import most_telling
 
 if TYPE_CHECKING:
     from shapespace.study.diagram_state import DiagramStates
+    from shapespace.study.modes import Modes
 
 MOST_SHAPES, MOST_POINTS = 400, 40_000
 """In one file: shapes of each diagram, which are computed for it, and points with their numbers."""
@@ -34,23 +34,31 @@ class DiagramSource(AbstractSource):
 
     noun = "diagram"
 
+    kind = DiagramStore
+
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._computes: tuple[tuple[int, ...], DiagramStates] | None = None
+        self._states: DiagramStates | None = None
+        self._arrays: dict[str, Any] | None = None
+
+    def forget(self) -> None:
+        super().forget()
+        self._states = self._arrays = None
 
     def store(self) -> DiagramStore:
-        return DiagramStore.open(self.path)
+        store = super().store()
+        assert isinstance(store, DiagramStore)
+        return store
 
     def content(self) -> dict[str, Any]:
         store = self.store()
         request, scenario = store.request, store.scenario
-        group = self._group()
-        names = [name for name in _arrays(group) if name not in (OUTCOME, REGIME, *ABOUT_SOLUTION)]
-        outcomes = self._values(group, OUTCOME)
+        names = [name for name in self.arrays() if name not in (OUTCOME, REGIME, *ABOUT_SOLUTION)]
+        outcomes = self._values(OUTCOME)
         found = outcomes == IS_STATE
 
         def change(name: str) -> float:
-            values = self._values(group, name)[found] if name in names else np.zeros(1)
+            values = self._values(name)[found] if name in names else np.zeros(1)
             values = values[np.isfinite(values)]
             return float(np.ptp(values)) if values.size else 0.0
 
@@ -70,20 +78,19 @@ class DiagramSource(AbstractSource):
 
     def values(self, name: str) -> dict[str, Any]:
         """One observable on all points (state, y, x), NaN where there is no state."""
-        group = self._group()
-        if name not in _arrays(group):
+        if name not in self.arrays():
             raise InputError(f"{name[:60]}: is no observable of this diagram.")
-        values = np.where(self._values(group, OUTCOME) == IS_STATE, self._values(group, name), np.nan)
+        values = np.where(self._values(OUTCOME) == IS_STATE, self._values(name), np.nan)
         return {"name": name, "values": exact(values)}
 
     def state(self, place: str) -> dict[str, Any]:
         number, i, j = self._place(place)
-        store, group = self.store(), self._group()
+        store = self.store()
         request = store.request
         keys = request.grid.keys
         x, y = request.grid.values(i, j).ravel().tolist()
         there = {
-            name: float(group[name][(number, j, i) if group[name].ndim == 3 else (j, i)]) for name in _arrays(group)
+            name: float(array[(number, j, i) if array.ndim == 3 else (j, i)]) for name, array in self.arrays().items()
         }
         code = int(there.pop(OUTCOME))
         reason = next((outcome for outcome, known in CODES.items() if known == code), None)
@@ -101,7 +108,7 @@ class DiagramSource(AbstractSource):
 
     def places(self) -> Iterator[str]:
         i, j = self._strides()
-        outcomes = self._values(self._group(), OUTCOME)[:, ::j, ::i]
+        outcomes = self._values(OUTCOME)[:, ::j, ::i]
         return (f"{s},{i * x},{j * y}" for s, y, x in np.argwhere(outcomes == IS_STATE))
 
     def questions(self) -> Iterator[tuple[str, dict[str, str]]]:
@@ -109,12 +116,12 @@ class DiagramSource(AbstractSource):
         points = len(store.request.states) * int(np.prod(store.request.grid.shape))
         if points > MOST_POINTS:
             raise InputError(f"{self.path}: its {points} points are too many for one file, at most {MOST_POINTS}.")
-        for name in _arrays(self._group()):
+        for name in self.arrays():
             yield "values", {"name": name}
         for place in self.places():
             yield "state", {"place": place}
             try:
-                self._states().state(self._place(place))
+                self.states().state(self._place(place))
             except StoreError:
                 # Not found again: the page says that it is not in the file.
                 continue
@@ -132,11 +139,11 @@ class DiagramSource(AbstractSource):
         # Imported late, as below: most stores are opened without a solver.
         from shapespace.study.dataset import profile_of
 
-        found = self._states().state(self._place(place))
+        found = self.states().state(self._place(place))
         at, frame = found.scenario, found.frame
         number, i, j = self._place(place)
         grid, name = self.store().request.grid, self.store().request.states[number]
-        tile = self._states().anchor((number, i, j))
+        tile = self.states().anchor((number, i, j))
         return described(
             at,
             frame,
@@ -150,21 +157,21 @@ class DiagramSource(AbstractSource):
             can_compute=True,
         )
 
-    def modes(self, place: str) -> Modes | None:
+    def modes(self, place: str) -> "Modes | None":
         return None
 
     def resting(self, place: str) -> tuple[Scenario, Frame]:
-        found = self._states().state(self._place(place))
+        found = self.states().state(self._place(place))
         return found.scenario, found.frame
 
-    def _states(self) -> "DiagramStates":
-        """What computes shapes again; of what is stored now, where the diagram is still being computed."""
-        stamp = tuple(file.stat().st_mtime_ns for file in sorted((self.path / "anchors").iterdir()))
-        if self._computes is None or self._computes[0] != stamp or self.store().outcome is None:
+    def states(self) -> "DiagramStates":
+        """What computes shapes again; from the numbers as they are now, where the diagram is still being computed."""
+        if self.store().outcome is None or self._states is None:
+            # Imported late, as solvers take seconds to load.
             from shapespace.study.diagram_state import DiagramStates
 
-            self._computes = (stamp, DiagramStates(self.path))
-        return self._computes[1]
+            self._states = DiagramStates(self.path)
+        return self._states
 
     def _place(self, text: str) -> tuple[int, int, int]:
         store = self.store()
@@ -177,24 +184,25 @@ class DiagramSource(AbstractSource):
             raise InputError(f"{text[:40]}: is no point of this diagram, which has {' by '.join(map(str, limits))}.")
         return state, i, j
 
-    def _group(self) -> Any:
-        with storage(self.path):
-            try:
-                return zarr.open_group(self.path, mode="r")
-            except (ValueError, KeyError, FileNotFoundError) as error:
-                raise StoreError(f"{self.path / 'zarr.json'}: is damaged or missing ({error}).") from None
+    def arrays(self) -> dict[str, Any]:
+        """What is stored at each point (y, x) or (state, y, x), to read; observables in the order of the glossary."""
+        self.store()
+        if self._arrays is None:
+            with storage(self.path):
+                try:
+                    group: Any = zarr.open_group(self.path, mode="r")
+                    found = {name: array for name, array in group.arrays() if array.ndim >= 2}
+                except (ValueError, KeyError, FileNotFoundError) as error:
+                    raise StoreError(f"{self.path / 'zarr.json'}: is damaged or missing ({error}).") from None
+            known = {name: place for place, name in enumerate(QUANTITIES)}
+            names = sorted(found, key=lambda name: (known.get(name, len(known)), name))
+            self._arrays = {name: found[name] for name in names}
+        return self._arrays
 
-    def _values(self, group: Any, name: str) -> Array:
+    def _values(self, name: str) -> Array:
         """An array (state, y, x)."""
-        values = np.asarray(group[name][...])
+        values = np.asarray(self.arrays()[name][...])
         return values.reshape(-1, *values.shape[-2:])
-
-
-def _arrays(group: Any) -> list[str]:
-    """Names of what is stored at each point, observables in the order of the glossary."""
-    known = {name: place for place, name in enumerate(QUANTITIES)}
-    names = [name for name in group.array_keys() if group[name].ndim >= 2]
-    return sorted(names, key=lambda name: (known.get(name, len(known)), name))
 
 
 def _boundary(curve: Curve) -> dict[str, Any]:

@@ -3,25 +3,25 @@
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
 from shapespace.app.encoding import exact
 from shapespace.app.source import AbstractSource, described, rates_of
-from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START, BranchStore
 from shapespace.study.curve_store import CurvePoint, CurveStore, outline
-from shapespace.study.frame import Frame
-from shapespace.study.modes import MODES_FILE, Modes, find_modes
-from shapespace.study.records import AbstractRecordStore
+from shapespace.study.frame import Array, Frame
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import SearchStore, Tried
 from shapespace.study.store import RunStore
 from shapespace.study.telling import most_telling
+
+if TYPE_CHECKING:
+    from shapespace.study.modes import Modes
 
 R = TypeVar("R")
 
@@ -29,19 +29,13 @@ R = TypeVar("R")
 class AbstractRecords(AbstractSource, Generic[R]):
     """A store of numbered records; the place of a state is the number of its record."""
 
-    kind: ClassVar[type[AbstractRecordStore[Any]]]
-
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._stamp: tuple[int, ...] = ()
-        self._open: AbstractRecordStore[R] | None = None
         self._all: list[R] | None = None
 
-    def store(self) -> AbstractRecordStore[R]:
-        stamp = self._changed()
-        if self._open is None or stamp != self._stamp:
-            self._open, self._all, self._stamp = self.kind.open(self.path), None, stamp
-        return self._open
+    def forget(self) -> None:
+        super().forget()
+        self._all = None
 
     def records(self) -> list[R]:
         """All records, in their stored order."""
@@ -71,12 +65,7 @@ class AbstractRecords(AbstractSource, Generic[R]):
 
         return profile_of(at, frame)
 
-    def _changed(self) -> tuple[int, ...]:
-        """When the store was written to last."""
-        files = (self.path / "store.json", self.path / self.kind.folder)
-        return tuple(file.stat().st_mtime_ns if file.exists() else 0 for file in files)
-
-    def modes(self, place: str) -> Modes | None:
+    def modes(self, place: str) -> "Modes | None":
         return None
 
 
@@ -102,6 +91,13 @@ def _telling(at: Scenario, columns: dict[str, Array], known: Sequence[str]) -> s
 
     name = most_telling(at.kind, change, known)
     return name if name in columns else next(iter(name for name in columns if name not in known), known[0])
+
+
+def _rates_of(point: BranchPoint | Tried) -> dict[str, Any] | None:
+    """Growth rates as they are stored, None where none are."""
+    if not len(point.growth_rates):
+        return None
+    return rates_of(point.growth_rates, point.growth_rate_errors, point.parities, point.neutral)
 
 
 class RunSource(AbstractRecords[Frame]):
@@ -135,11 +131,15 @@ class RunSource(AbstractRecords[Frame]):
             place=place,
             title=f"frame {number}" if len(store) > 1 else "stationary state",
             time=frame.time,
-            rates=rates_of(modes) if modes is not None else None,
+            rates=rates_of(modes.growth_rates, modes.errors, modes.parities, modes.neutral)
+            if modes is not None
+            else None,
             can_compute=modes is None and rests,
         )
 
-    def modes(self, place: str) -> Modes | None:
+    def modes(self, place: str) -> "Modes | None":
+        from shapespace.study.modes import MODES_FILE, find_modes
+
         return find_modes(str(self.path)) if (self.path / MODES_FILE).is_file() else None
 
     def resting(self, place: str) -> tuple[Scenario, Frame]:
@@ -205,7 +205,9 @@ class BranchSource(AbstractRecords[BranchPoint]):
             title=label or f"point {place}",
             parameters={request["key"]: point.parameter, **({free: point.value} if free else {})},
             parameter_error=point.parameter_error if label else None,
-            rates=rates_of(point) if len(point.growth_rates) else None,
+            rates=rates_of(point.growth_rates, point.growth_rate_errors, point.parities, point.neutral)
+            if len(point.growth_rates)
+            else None,
             unstable=point.n_unstable,
             can_compute=not len(point.modes) and free is None,
         )
@@ -214,10 +216,12 @@ class BranchSource(AbstractRecords[BranchPoint]):
         point = self.record(place)
         return point.growth_rates if len(point.growth_rates) else None
 
-    def modes(self, place: str) -> Modes | None:
+    def modes(self, place: str) -> "Modes | None":
         point = self.record(place)
         if not len(point.modes):
             return None
+        from shapespace.study.modes import Modes
+
         rates, errors = point.growth_rates, point.growth_rate_errors
         return Modes(
             self.scenario_at(point), point.frame, rates, errors, point.modes, tuple(point.parities), point.neutral
@@ -334,7 +338,9 @@ class SearchSource(AbstractRecords[Tried]):
             self.start(place, one.label),
             place=place,
             title=one.label,
-            rates=rates_of(one) if len(one.growth_rates) else None,
+            rates=rates_of(one.growth_rates, one.growth_rate_errors, one.parities, one.neutral)
+            if len(one.growth_rates)
+            else None,
             unstable=one.n_unstable,
             can_compute=True,
         )

@@ -2,21 +2,22 @@
 
 from abc import ABC, abstractmethod
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from shapespace.app.commands import continuations, python_of
 from shapespace.app.encoding import drawn, finite, number
-from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
 from shapespace.base.scales import QUANTITIES
-from shapespace.study.frame import Frame
-from shapespace.study.modes import CRITICAL, Modes
+from shapespace.study.frame import Array, Frame
 from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import Scenario
+
+if TYPE_CHECKING:
+    from shapespace.study.modes import Modes
 
 KEPT = 32
 """States whose computed modes are kept."""
@@ -28,14 +29,29 @@ class AbstractSource(ABC):
     """One store, read anew whenever it has changed. Everything returned is for JSON; places of states are text."""
 
     noun: ClassVar[str]
+    kind: ClassVar[type[AbstractRecordStore[Any]]]
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._stamp: tuple[int, ...] = ()
+        self._open: AbstractRecordStore[Any] | None = None
         self._computed: OrderedDict[str, Modes] = OrderedDict()
 
-    @abstractmethod
     def store(self) -> AbstractRecordStore[Any]:
-        """The store, to read. StoreError where it is damaged."""
+        """The store, to read, as it is now. StoreError where it is damaged."""
+        stamp = tuple(
+            file.stat().st_mtime_ns if file.exists() else 0
+            for file in (self.path / "store.json", self.path / self.kind.folder)
+        )
+        if self._open is None or stamp != self._stamp:
+            self._open = self.kind.open(self.path)
+            self._stamp = stamp
+            self.forget()
+        return self._open
+
+    def forget(self) -> None:
+        """What was read of the store before it changed."""
+        self._computed.clear()
 
     @abstractmethod
     def content(self) -> dict[str, Any]:
@@ -50,7 +66,7 @@ class AbstractSource(ABC):
         """Everything about one state. InputError where there is none."""
 
     @abstractmethod
-    def modes(self, place: str) -> Modes | None:
+    def modes(self, place: str) -> "Modes | None":
         """Stored modes of a state; None where none are."""
 
     @abstractmethod
@@ -87,7 +103,8 @@ class AbstractSource(ABC):
 
     def spectrum(self, place: str) -> dict[str, Any]:
         """Leading growth rates of a state, computed where they are not stored; that may take seconds."""
-        return rates_of(self._modes(place))
+        modes = self._modes(place)
+        return rates_of(modes.growth_rates, modes.errors, modes.parities, modes.neutral)
 
     def mode(self, place: str, index: int) -> dict[str, Any]:
         """The mode of a growth rate, by the number that it has in the state's own list."""
@@ -104,7 +121,7 @@ class AbstractSource(ABC):
         """Growth rates (m, 2) that are stored with a state, None where none are."""
         return None
 
-    def _modes(self, place: str) -> Modes:
+    def _modes(self, place: str) -> "Modes":
         stored = self.modes(place)
         if stored is not None:
             return stored
@@ -143,18 +160,20 @@ def described(
     }
 
 
-def rates_of(modes: Any) -> dict[str, Any]:
-    """Growth rates of modes, or of a stored point, with what is known of them."""
-    errors = modes.errors if isinstance(modes, Modes) else modes.growth_rate_errors
+def rates_of(rates: Array, errors: Array, parities: Sequence[str | None], neutral: Mapping[int, str]) -> dict[str, Any]:
+    """Growth rates (m, 2) with what is known of them."""
+    # Imported late, as all that needs the library of derivatives: an overview is there sooner.
+    from shapespace.study.modes import CRITICAL
+
     return {
-        "values": np.asarray(modes.growth_rates).reshape(-1, 2).tolist(),
+        "values": rates.reshape(-1, 2).tolist(),
         "errors": [number(error) for error in errors.tolist()],
-        "parities": list(modes.parities),
-        "neutral": {str(i): name or CRITICAL for i, name in modes.neutral.items()},
+        "parities": list(parities),
+        "neutral": {str(i): name or CRITICAL for i, name in neutral.items()},
     }
 
 
-def mode_of(modes: Modes, index: int) -> dict[str, Any]:
+def mode_of(modes: "Modes", index: int) -> dict[str, Any]:
     """A mode's profiles, in units of the length and the concentration that its size 1 stands for."""
     found = modes.profiles(index, POINTS)
     unit = modes.scenario.scales.factor("length")

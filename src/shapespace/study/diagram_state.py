@@ -2,18 +2,20 @@
 
 from collections import OrderedDict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+import zarr
 
 from shapespace.analysis.stationary import Stationary, step_to
 from shapespace.analysis.sweeping import SWEEP_NEWTON
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
-from shapespace.study.diagram_store import CODES, DiagramStore, open_diagram
+from shapespace.study.diagram_store import CODES, OUTCOME, DiagramStore, open_diagram
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.scenario import Scenario
-from shapespace.study.steady import Steady
-from shapespace.study.tiles import Surveyor, find_state
+from shapespace.study.steady import Steady, observables_at
+from shapespace.study.tiles import TELLING, Surveyor, find_state
 
 KEPT = 64
 """States to go on from: those beside a known one are a few Newton steps away."""
@@ -33,6 +35,7 @@ class DiagramStates:
         self._grid = self._store.request.grid
         self._anchors = [*self._store]
         self._surveyor = Surveyor(self._store.scenario, self._grid.keys, stability=False)
+        self._arrays: Any = zarr.open_group(path, mode="r")
         self._known: OrderedDict[Place, Stationary] = OrderedDict()
 
     def scenario_at(self, place: Place) -> Scenario:
@@ -42,8 +45,7 @@ class DiagramStates:
 
     def state(self, place: Place) -> Steady:
         """The state at a point. InputError where the diagram has none, StoreError where it is not found again."""
-        codes = self._store.outcomes if place not in self._known else None
-        if codes is not None and codes[place] != CODES[Outcome.CONVERGED]:
+        if place not in self._known and self._stored(OUTCOME, place) != CODES[Outcome.CONVERGED]:
             raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
         number, at = place[0], (place[1], place[2])
         found = self._known.get(place) or self._stepped(place)
@@ -85,10 +87,20 @@ class DiagramStates:
             start = self._surveyor.state(anchors.meshes[number], anchors.xs[number], values)
         goal = self._grid.values(*place[1:]).reshape(2)
         found = step_to(start, goal, SWEEP_NEWTON, SHORTEST) if not np.array_equal(start.p, goal) else start
-        is_found = found.outcome.is_success and self._surveyor.is_stored(
-            found, self._diagram, place[0], (place[1], place[2])
+        return found if found.outcome.is_success and self._is_stored(found, place) else None
+
+    def _is_stored(self, found: Stationary, place: Place) -> bool:
+        """Whether a state is that of the diagram; of the store only this point is read."""
+        assert isinstance(found.problem, KeyedProblem)
+        mine = observables_at(self.scenario_at(place), found.problem.base, found.x)
+        return all(
+            abs(mine[name] - self._stored(name, place)) <= TELLING * abs(mine[name]) for name in ("area", "length")
         )
-        return found if is_found else None
+
+    def _stored(self, name: str, place: Place) -> float:
+        """What the store has at a point; only this is read of it."""
+        number, i, j = place
+        return float(self._arrays[name][(number, j, i) if len(self._store.request.states) > 1 else (j, i)])
 
     def _middle(self, tile: int) -> tuple[int, int]:
         i, j = self._grid.tiles[tile]

@@ -8,8 +8,8 @@ from typing import Any, Self
 
 import numpy as np
 
-from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
+from shapespace.study.frame import Array
 from shapespace.study.keys import MODELS
 from shapespace.study.scenario import Scenario
 
