@@ -38,7 +38,8 @@ def main() -> None:
     """Print the table."""
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 500
     if PROGRAM is None:
-        sys.exit("needs Chromium")
+        print("left out: needs Chromium")
+        return
     print(machine())
     with tempfile.TemporaryDirectory() as folder, chromium() as browser:
         there = Path(folder)
@@ -57,28 +58,33 @@ def show(browser: Browser, path: Path) -> None:
     began = time.perf_counter()
     command = [sys.executable, "-m", "shapespace", "explore", str(path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as server:
-        assert server.stdout is not None
-        address = server.stdout.readline().strip()
-        print(f"    command to address: {time.perf_counter() - began:.2f} s")
-        for words in ("opens at once", "opens again"):
-            began = time.perf_counter()
-            browser.open(address, SHOWN)
-            shown = time.perf_counter() - began
-            browser.wait(SHAPE)
-            print(f"    {words}: states drawn {shown:.2f} s, first shape {time.perf_counter() - began:.2f} s")
-        browser.wait("!!document.body.dataset.stage")
-        size = browser.run(
-            "performance.getEntriesByType('resource').reduce((sum, one) => sum + one.encodedBodySize, 0)"
-        )
-        print(f"    transferred: {size / 1e6:.1f} MB")
-        random = np.random.default_rng(1)
-        places = random.uniform(0.15, 0.85, (CLICKS, 2))
-        times = np.array([one for x, y in places if (one := browser.run(CLICK % (x, y))) is not None])
-        if len(times):
-            middle, worst = np.median(times, axis=0), times.max(axis=0)
-            print(f"    {len(times)} clicks, numbers: median {middle[0]:.0f} ms, longest {worst[0]:.0f} ms; "
-                  f"shape: median {middle[1]:.0f} ms, longest {worst[1]:.0f} ms")  # fmt: skip
-        server.terminate()
+        try:
+            watch(browser, server, began)
+        finally:
+            server.terminate()
+
+
+def watch(browser: Browser, server: "subprocess.Popen[str]", began: float) -> None:
+    """Times from the address to the last click."""
+    assert server.stdout is not None
+    address = server.stdout.readline().strip()
+    print(f"    command to address: {time.perf_counter() - began:.2f} s")
+    for words in ("opens at once", "opens again"):
+        began = time.perf_counter()
+        browser.open(address, SHOWN)
+        shown = time.perf_counter() - began
+        browser.wait(SHAPE)
+        print(f"    {words}: states drawn {shown:.2f} s, first shape {time.perf_counter() - began:.2f} s")
+    browser.wait("!!document.body.dataset.stage")
+    size = browser.run("performance.getEntriesByType('resource').reduce((sum, one) => sum + one.encodedBodySize, 0)")
+    print(f"    transferred: {size / 1e6:.1f} MB")
+    random = np.random.default_rng(1)
+    places = random.uniform(0.15, 0.85, (CLICKS, 2))
+    times = np.array([one for x, y in places if (one := browser.run(CLICK % (x, y))) is not None])
+    if len(times):
+        middle, worst = np.median(times, axis=0), times.max(axis=0)
+        print(f"    {len(times)} clicks, numbers: median {middle[0]:.0f} ms, longest {worst[0]:.0f} ms; "
+              f"shape: median {middle[1]:.0f} ms, longest {worst[1]:.0f} ms")  # fmt: skip
 
 
 if __name__ == "__main__":
