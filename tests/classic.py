@@ -47,7 +47,7 @@ class Ring(AbstractSystem):
         force = k**3 / 2.0 - s[0] * k - p[0] + s[1] * self.pull(u)
         return jnp.stack([dy[0] - length * slope, dy[1] + length * (force - dq[0])])
 
-    def stored(self, y: Traced, s: Traced) -> Traced:
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
         return y[:1]
 
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:

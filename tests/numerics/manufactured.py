@@ -31,7 +31,7 @@ class Everything(AbstractSystem):
         g = f["dy2"] - f["a"] ** 2 * f["y1"] + 2.0 * f["y1"] - jnp.cos(u)
         return jnp.stack([dy[0] - s[0] * y[1], dy[1] - a[0] ** 2 * y[0] - dq[0] - g, a[0] * (1.0 + y[0] ** 2) - 1.0])
 
-    def stored(self, y: Traced, s: Traced) -> Traced:
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
         return y[:1]
 
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:
@@ -91,7 +91,7 @@ class BoundaryLayer(AbstractSystem):
     def equations(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, u: Traced, p: Traced) -> Traced:
         return jnp.stack([p[0] * dy[0] - y[1], p[0] * dy[1] - y[0]])
 
-    def stored(self, y: Traced, s: Traced) -> Traced:
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
         return y[:1]
 
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:
@@ -120,7 +120,7 @@ class InteriorLayer(AbstractSystem):
     def equations(self, dy: Traced, y: Traced, a: Traced, s: Traced, dq: Traced, u: Traced, p: Traced) -> Traced:
         return jnp.stack([p[0] * dy[0] - y[1], p[0] ** 2 * dy[1] + (u - 0.3) * y[1]])
 
-    def stored(self, y: Traced, s: Traced) -> Traced:
+    def stored(self, y: Traced, a: Traced, s: Traced) -> Traced:
         return y[:1]
 
     def end_conditions(self, y0: Traced, y1: Traced, s: Traced, dq0: Traced, dq1: Traced, p: Traced) -> Traced:

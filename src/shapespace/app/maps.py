@@ -66,7 +66,7 @@ class DiagramSource(AbstractSource):
             "map": {
                 "x": {"key": request.grid.x.key, "values": exact(request.grid.x.values)},
                 "y": {"key": request.grid.y.key, "values": exact(request.grid.y.values)},
-                "states": list(request.states),
+                "states": list(request.labels),
                 "names": names,
                 "strides": self._strides(),
                 "of": most_telling(scenario.kind, change),
@@ -97,7 +97,7 @@ class DiagramSource(AbstractSource):
         unstable = there.pop(UNSTABLE, np.nan)
         return {
             "place": place,
-            "title": request.states[number],
+            "title": request.labels[number],
             "parameters": dict(zip(keys, (x, y), strict=True)),
             "observables": finite(
                 {name: value for name, value in there.items() if name not in (REGIME, *ABOUT_SOLUTION)}
@@ -113,7 +113,7 @@ class DiagramSource(AbstractSource):
 
     def questions(self) -> Iterator[tuple[str, dict[str, str]]]:
         store = self.store()
-        points = len(store.request.states) * int(np.prod(store.request.grid.shape))
+        points = len(store.request.labels) * int(np.prod(store.request.grid.shape))
         if points > MOST_POINTS:
             raise InputError(f"{self.path}: its {points} points are too many for one file, at most {MOST_POINTS}.")
         for name in self.arrays():
@@ -130,7 +130,7 @@ class DiagramSource(AbstractSource):
     def _strides(self) -> tuple[int, int]:
         """Every how many points along x and y a file has a shape."""
         store = self.store()
-        wanted = math.sqrt(MOST_SHAPES / len(store.request.states))
+        wanted = math.sqrt(MOST_SHAPES / len(store.request.labels))
         i, j = (math.ceil(count / wanted) for count in store.request.grid.shape)
         return i, j
 
@@ -141,19 +141,17 @@ class DiagramSource(AbstractSource):
 
         found = self.states().state(self._place(place))
         at, frame = found.scenario, found.frame
-        number, i, j = self._place(place)
-        grid, name = self.store().request.grid, self.store().request.states[number]
-        tile = self.states().anchor((number, i, j))
+        request = self.store().request
         return described(
             at,
             frame,
             profile_of(at, frame),
-            f"{self.path.resolve()}:{name}-{tile}",
-            vary=grid.x.key,
-            stop=grid.x.stop,
+            f"{self.path.resolve()}:{self.states().origin(self._place(place))}",
+            vary=request.grid.x.key,
+            stop=request.grid.x.stop,
             exactly=True,
             place=place,
-            title=name,
+            title=request.labels[self._place(place)[0]],
             can_compute=True,
         )
 
@@ -176,7 +174,7 @@ class DiagramSource(AbstractSource):
     def _place(self, text: str) -> tuple[int, int, int]:
         store = self.store()
         parts = text.split(",")
-        limits = (len(store.request.states), *store.request.grid.shape)
+        limits = (len(store.request.labels), *store.request.grid.shape)
         if len(parts) != 3 or not all(part.isdecimal() for part in parts):
             raise InputError(f"{text[:20]!r}: is no point of this diagram; give STATE,I,J.")
         state, i, j = map(int, parts)

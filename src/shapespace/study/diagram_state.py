@@ -68,6 +68,14 @@ class DiagramStates:
         known = [number for number, outcome in enumerate(anchors.outcomes) if outcome is Outcome.CONVERGED]
         return min(known, key=lambda number: self._distance(self._middle(number), place), default=None)
 
+    def origin(self, place: Place) -> str | None:
+        """The label of the nearest stored state that the diagram was computed from, None where there is none."""
+        for number in range(len(self._anchors)) if self._store.request.branches else place[:1]:
+            tile = self.anchor((number, *place[1:]))
+            if tile is not None:
+                return f"{self._anchors[number].state}-{tile}"
+        return None
+
     def _stepped(self, place: Place) -> Stationary | None:
         """By a few long steps from the nearest known state; None where they lead elsewhere."""
         number = self.anchor(place)
@@ -100,7 +108,7 @@ class DiagramStates:
     def _stored(self, name: str, place: Place) -> float:
         """What the store has at a point; only this is read of it."""
         number, i, j = place
-        return float(self._arrays[name][(number, j, i) if len(self._store.request.states) > 1 else (j, i)])
+        return float(self._arrays[name][(number, j, i) if len(self._store.request.labels) > 1 else (j, i)])
 
     def _middle(self, tile: int) -> tuple[int, int]:
         i, j = self._grid.tiles[tile]

@@ -55,8 +55,10 @@ def compute_tile(path: str | Path, tile: Tile) -> Done:
     store = DiagramStore.open(path)
     values = _all_sheets(store, tile) if store.request.branches else _named(store, tile)
     store.write_tile(tile, values)
-    outcomes = values[OUTCOME]
-    return Done(tile, outcomes.size, int((outcomes == CODES[Outcome.CONVERGED]).sum()), perf_counter() - start)
+    is_state = values[OUTCOME] == CODES[Outcome.CONVERGED]
+    if store.request.branches:  # however many states a point has, it counts once
+        is_state = is_state.any(axis=0)
+    return Done(tile, is_state.size, int(is_state.sum()), perf_counter() - start)
 
 
 def _named(store: DiagramStore, tile: Tile) -> dict[str, Array]:
