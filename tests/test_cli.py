@@ -300,7 +300,8 @@ def test_pictures_and_export_go_where_they_are_wanted(shell: Shell, monkeypatch:
     figure_module = pytest.importorskip("shapespace.view.figure")
     movie_module = pytest.importorskip("shapespace.view.movie")
     dataset = xr.Dataset({"height": ("time", [1.0, 2.0])})
-    monkeypatch.setattr(dataset_module, "open_dataset", lambda _: dataset)
+    for module in (dataset_module, pytest.importorskip("shapespace.study.tables")):
+        monkeypatch.setattr(module, "open_dataset", lambda _: dataset)
     monkeypatch.setattr(figure_module, "plot_run", lambda _: Figure())
     monkeypatch.setattr(movie_module, "save_movie", lambda _data, path, _progress: path)
     Path("run").mkdir()
