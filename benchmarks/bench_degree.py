@@ -6,6 +6,7 @@ Run: python benchmarks/bench_degree.py   (about two minutes, most of it compilat
 """
 
 from dataclasses import replace
+from functools import partial
 
 from benchmarks.timing import machine, milliseconds, use_one_core
 
@@ -68,7 +69,7 @@ def main() -> None:
         for elements in (40, 80, 160):
             state, problem, x = solve(degree, elements)
             rest = Rate(0.0, np.zeros_like(problem.stored(x, engine.p)))
-            best, _ = milliseconds(lambda: problem.linearise(x, engine.p, rest), 30)  # noqa: B023  (used at once)
+            best, _ = milliseconds(partial(problem.linearise, x, engine.p, rest), 30)
             error = abs(state.values(half)[0, 0] / exact - 1.0)
             print(f"{degree:7d}{elements:9d}{error:12.1e}{discretisation_error(state):12.1e}{best:14.2f}")
 

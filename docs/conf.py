@@ -18,20 +18,17 @@ from sphinx.util import logging
 
 project = "shapespace"
 author = "the shapespace developers"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.viewcode"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax", "sphinx.ext.viewcode", "sphinx-mathjax-offline"]
 myst_enable_extensions = ["dollarmath", "amsmath"]
 myst_fence_as_directive = ["math"]
 myst_heading_anchors = 3
-mathjax_path = "mathjax/tex-svg.js"
 html_theme = "furo"
 html_title = "shapespace"
-html_static_path = ["_static"]
 html_show_sourcelink = False
 html_show_copyright = False
 default_role = "code"
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
-exclude_patterns = ["_static"]
 # Links to files of the repository that are no pages.
 suppress_warnings = ["myst.xref_missing"]
 

@@ -44,18 +44,18 @@ PARAMETERS = {
 
 
 @power("chemical")
-def ring_tension(concentration, azimuthal_strain_rate, ring_contraction, motor_concentration):  # type: ignore[no-untyped-def]
+def ring_tension(concentration, azimuthal_strain_rate, ring_contraction, motor_concentration):
     """Filaments along the ring contract it."""
     return -ring_contraction * (concentration / motor_concentration - 1.0) * azimuthal_strain_rate
 
 
 @power("chemical")
-def chiral_torque(concentration, vorticity, torque, motor_concentration):  # type: ignore[no-untyped-def]
+def chiral_torque(concentration, vorticity, torque, motor_concentration):
     """Torque times the rate of spinning about the normal."""
     return 0.5 * torque * concentration / motor_concentration * vorticity
 
 
-def motors(p):  # type: ignore[no-untyped-def]
+def motors(p):
     """They diffuse, and turn over towards a ring at the equator."""
     return Species(p.diffusivity, p.turnover_rate, Ring(p.motor_concentration, p.ring_amplitude, p.ring_width))
 
@@ -133,7 +133,7 @@ def azimuthal(case: ss.Scenario) -> "tuple[Array, Array, Array, Array]":
     from shapespace.study.dataset import profile_of
 
     fields = profile_of(case, ss.steady(case).frame)
-    return tuple(fields[name] for name in ("mesh_coordinate", "azimuthal_velocity", "tangent_angle", "concentration"))  # type: ignore[return-value]
+    return tuple(fields[name] for name in ("mesh_coordinate", "azimuthal_velocity", "tangent_angle", "concentration"))
 
 
 def ratio(flows: "dict[float, Array]") -> float:

@@ -30,7 +30,7 @@ class AlgebraicProblem(AbstractSmoothProblem):
 
     @cached_property
     def _second_derivative(self) -> Callable[..., Traced]:
-        def along(x, p, one, dp, other, ep):  # type: ignore[no-untyped-def]
+        def along(x, p, one, dp, other, ep):
             return jax.jvp(lambda x, p: jax.jvp(self.function, (x, p), (one, dp))[1], (x, p), (other, ep))[1]
 
         return jax.jit(along)

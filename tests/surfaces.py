@@ -39,7 +39,7 @@ def march(
     engine: Engine, until: float, *, state: State | None = None, newton: Newton = Newton(), **stepping: float
 ) -> tuple[list[Moment], Outcome | None]:
     """All moments from the start on, and why they ended; never stationary unless `stationary_rate` is given."""
-    options = Stepping(**{"stationary_rate": 0.0, **stepping})  # type: ignore[arg-type]
+    options = Stepping(**{"stationary_rate": 0.0, **stepping})
     past = start_of(engine, state)
     evolution = Evolution([past], engine.p, until, options, newton)
     return [past, *evolution], evolution.outcome

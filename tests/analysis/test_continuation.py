@@ -41,7 +41,7 @@ def start(
     """The first point of a branch in p[0], from a guess."""
     found = solve_stationary(problem, x, np.array(p, dtype=float))
     assert found.outcome is Outcome.CONVERGED
-    point = start_point(found.problem, found.x, found.p, 0, direction, Arclength(**options))  # type: ignore[arg-type]
+    point = start_point(found.problem, found.x, found.p, 0, direction, Arclength(**options))
     assert isinstance(point, Point)
     return point
 
@@ -50,7 +50,7 @@ def follow(
     begin: Point, stops: Sequence[Stop] = (), events: Sequence[Event] = (), **options: float
 ) -> tuple[list[Point], Outcome]:
     """All points of a branch, and how it ended."""
-    made = Continuation([begin], stops, Arclength(**options), events=events)  # type: ignore[arg-type]
+    made = Continuation([begin], stops, Arclength(**options), events=events)
     points = [begin, *made]
     assert made.outcome is not None
     return points, made.outcome
@@ -67,7 +67,7 @@ def near(points: Sequence[Point], kind: str) -> list[float]:
         if bracket.kind == kind == "fold":
             a, b = bracket.before, bracket.after
             ends = (np.array(v) for v in (a.parameter, a.tangent[-1], b.parameter, b.tangent[-1]))
-            cubic = hermite(*ends, b.arclength - a.arclength)  # type: ignore[call-arg, arg-type]
+            cubic = hermite(*ends, b.arclength - a.arclength)
             turns = polyroots(polyder(cubic))
             (turn,) = turns[(turns > 0.0) & (turns < b.arclength - a.arclength)]
             out.append(float(polyval(turn, cubic)))
@@ -322,7 +322,7 @@ def test_the_number_of_points_is_bounded():
 @pytest.mark.parametrize("wrong", [{"first": 1.0}, {"smallest": 0.0}, {"turn": 2.0}])
 def test_options_are_checked(wrong: dict[str, float]):
     with pytest.raises(ValueError, match="must"):
-        Arclength(**wrong)  # type: ignore[arg-type]
+        Arclength(**wrong)
 
 
 def first_return(begin: Point, options: Arclength) -> float:

@@ -102,7 +102,7 @@ def test_every_start_is_on_record():
     found = [trial for trial in trials if trial.is_new]
     assert [trial.number for trial in found] == [0, 1]
     assert not any(trial.found.outcome.is_success for trial in trials if not trial.is_new)
-    tops = [middle(trial.found.problem, trial.found.x) for trial in found]  # type: ignore[arg-type]
+    tops = [middle(trial.found.problem, trial.found.x) for trial in found]
     np.testing.assert_allclose(tops, [0.140539214400472, 4.091467246189261], atol=1e-8)
     again = list(search([guess], p, further, trials[:4]))
     assert [(one.name, one.number, one.found.outcome) for one in again] == [

@@ -49,7 +49,7 @@ def evolution(
 ) -> tuple[list[Moment], Outcome | None]:
     """Accepted moments after the past, and why they ended."""
     assert all(moment.problem is problem for moment in past)
-    options = Stepping(**{"stationary_rate": 0.0, **stepping})  # type: ignore[arg-type]
+    options = Stepping(**{"stationary_rate": 0.0, **stepping})
     made = Evolution(past, NO_PARAMETERS, until, options, newton)
     return list(made), made.outcome
 
@@ -274,7 +274,7 @@ def test_going_on_beyond_an_end_takes_the_step_up_again():
 @pytest.mark.parametrize("options", [{"order": 0}, {"order": 4}, {"fixed_step": -1.0}, {"tolerance": 0.0}])
 def test_options_out_of_range_are_refused(options: dict[str, float]):
     with pytest.raises(ValueError, match=r"must be|and tolerance"):
-        Stepping(**options)  # type: ignore[arg-type]
+        Stepping(**options)
 
 
 @functools.cache

@@ -40,7 +40,7 @@ def test_no_states_beyond_a_fold():
     sweep.spread((0, 0))
     assert [(i, 0) in sweep.found for i in range(9)] == (a < FOLD).tolist()
     assert all(one in (Outcome.NOT_REACHED, Outcome.NO_STATE) for one in sweep.reasons.values())
-    middles = [one.problem.unpack(one.x).values(np.array([0.5]))[0, 0] for one in sweep.found.values()]  # type: ignore[attr-defined]
+    middles = [one.problem.unpack(one.x).values(np.array([0.5]))[0, 0] for one in sweep.found.values()]
     assert max(middles) < 2.0  # the fold is at T = 1.3; the upper branch lies above 10 here
 
 

@@ -148,9 +148,9 @@ def test_bad_definitions_are_named():
     with pytest.raises(ValueError, match="'Activity': the model has no such term; it has HelfrichBending"):
         define_model("mine", "closed-surface", [law], one, without=["Activity"])
     with pytest.raises(ValueError, match="surplus"):
-        define_model("mine", "closed-surface", [law], one, ends={"w": (None, None)})  # type: ignore[dict-item]
+        define_model("mine", "closed-surface", [law], one, ends={"w": (None, None)})
     with pytest.raises(ValueError, match="is no law; make it one with @energy"):
-        define_model("mine", "closed-surface", [law.function], one)  # type: ignore[list-item]
+        define_model("mine", "closed-surface", [law.function], one)
     with pytest.raises(ValueError, match="'mine': is not defined"):
         define_scenario("s", "S", "mine", "polar-swimmer")
 

@@ -91,7 +91,7 @@ def end_value(engine: Engine, values: Array) -> float:
 def pulled(ends: dict[str, tuple[object, object]]) -> tuple[Engine, Moment]:
     """A membrane that rises under a pull, with other ends."""
     made = make_engine("membrane-protrusion", elements=160, degree=6, pulling_force=20.0)
-    system = replace(open_membrane.RECIPE, ends={**open_membrane.ENDS, **ends}).system()  # type: ignore[dict-item]
+    system = replace(open_membrane.RECIPE, ends={**open_membrane.ENDS, **ends}).system()
     engine = replace(made, problem=replace(made.problem, system=system))
     return engine, moved(engine, 0.01)
 

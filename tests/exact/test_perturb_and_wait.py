@@ -21,7 +21,7 @@ def test_the_leading_rate_is_that_of_a_small_perturbation(state: str, peclet: fl
     assert spectrum.rates[0].imag == 0.0
     assert np.sign(rate) == sign
     engine = make_engine("polar-swimmer", peclet=peclet)
-    engine = replace(engine, problem=engine.problem.on_mesh(steady.found.problem.base.mesh))  # type: ignore[attr-defined]
+    engine = replace(engine, problem=engine.problem.on_mesh(steady.found.problem.base.mesh))
     start = state_of(steady.perturbed(AMPLITUDE).frame)
     moments, _ = march(engine, 0.5 / abs(rate), state=start, tolerance=1e-7)
     times = np.array([moment.time for moment in moments])

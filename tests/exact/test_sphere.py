@@ -72,7 +72,7 @@ def test_pressure_in_the_units_of_the_user():
     }  # fmt: skip
     case = scenario("polar-swimmer", elements=20, seed_amplitude=0.0, until=1e-3, **constants)
     result = run(case)
-    exact = pressure(case.values())  # type: ignore[arg-type]
+    exact = pressure(case.values())
     found = result.observables["pressure"]
     assert abs(found / exact - 1.0) < 1e-9, f"{result.outcome}: p = {found:.12g}, exact {exact:.12g}"
 

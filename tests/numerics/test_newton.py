@@ -18,7 +18,7 @@ def find(function: Callable[[Array], Array], *start: float, **options: float) ->
     """Solve function(x) = 0."""
     problem = DenseProblem(lambda x, dq, p: function(x))
     x = np.array(start)
-    return solve_root(problem, x, NO_PARAMETERS, at_rest(len(x)), Newton(**options))  # type: ignore[arg-type]
+    return solve_root(problem, x, NO_PARAMETERS, at_rest(len(x)), Newton(**options))
 
 
 def coupled(x: Array) -> Array:
@@ -132,7 +132,7 @@ def test_iterates_do_not_depend_on_the_scale_of_the_equations(scales: tuple[floa
 @pytest.mark.parametrize("options", [{"tolerance": 0.0}, {"tolerance": 2.0}, {"min_damping": 0.0}])
 def test_options_out_of_range_are_refused(options: dict[str, float]):
     with pytest.raises(ValueError, match="must lie in"):
-        Newton(**options)  # type: ignore[arg-type]
+        Newton(**options)
 
 
 def moving_surface(name: str) -> tuple[Engine, Array, Rate]:

@@ -275,7 +275,7 @@ class Liar(AbstractLinearisation):
 class Contradictory(CollocationProblem):
     """At rest the determinant has the wrong sign, as if a real rate had been missed."""
 
-    def linearise(self, x: Array, p: Array, rate: Rate, border: Border | None = None):  # type: ignore[no-untyped-def]
+    def linearise(self, x: Array, p: Array, rate: Rate, border: Border | None = None):
         residual, factors = super().linearise(x, p, rate, border)
         return residual, Liar(factors) if rate.coefficient < 0.1 else factors
 

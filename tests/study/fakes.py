@@ -74,7 +74,7 @@ def install(patch: pytest.MonkeyPatch | None = None) -> type[FakeSimulation]:
     """Put a fresh FakeSimulation in the place of the solver, for one test or for this process."""
     fake = type("Simulation", (FakeSimulation,), {"starts": []})
     module = ModuleType("shapespace.study.simulation")
-    module.Simulation = fake  # type: ignore[attr-defined]
+    module.Simulation = fake
     if patch is None:
         sys.modules[module.__name__] = module
     else:

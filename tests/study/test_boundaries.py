@@ -150,5 +150,5 @@ def test_bad_numbers_of_branches(tmp_path: Path):
         ({"branches": 2, "origins": ("nowhere",)}, "nowhere"),
     ):
         with pytest.raises((InputError, StoreError), match=re.escape(part)):
-            diagram(scenario("guided-division"), *axes, out=tmp_path / "d", workers=1, **arguments)  # type: ignore[arg-type]
+            diagram(scenario("guided-division"), *axes, out=tmp_path / "d", workers=1, **arguments)
     assert not (tmp_path / "d").exists()

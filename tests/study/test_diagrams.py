@@ -94,10 +94,10 @@ def test_a_lost_tile_is_computed_again_the_same(stored: Diagram):
     lost.unlink()
     assert DiagramStore.open(stored.store).missing_tiles == [(0, 1)]
     arguments = {"states": ("trivial", "default"), "out": stored.store, "workers": 1, "resume": True}
-    again = diagram(swimmer(), X, Y, progress=told.append, **arguments)  # type: ignore[arg-type]
+    again = diagram(swimmer(), X, Y, progress=told.append, **arguments)
     assert [one.tile for one in told] == [(0, 1)]
     xr.testing.assert_identical(again.dataset, before)
-    diagram(swimmer(), X, Y, progress=told.append, **arguments)  # type: ignore[arg-type]
+    diagram(swimmer(), X, Y, progress=told.append, **arguments)
     assert len(told) == 1
 
 
@@ -113,7 +113,7 @@ def test_another_diagram_is_not_continued(stored: Diagram, changes: dict[str, ob
     before = {path: path.stat().st_mtime_ns for path in stored.store.rglob("*")}
     arguments = {"scenario": swimmer(), "x": X, "y": Y, "states": ("trivial", "default"), "workers": 1} | changes
     with pytest.raises(StoreError, match="resume with the same") as complaint:
-        diagram(**arguments, out=stored.store, resume=True)  # type: ignore[arg-type]
+        diagram(**arguments, out=stored.store, resume=True)
     assert part in str(complaint.value)
     assert before == {path: path.stat().st_mtime_ns for path in stored.store.rglob("*")}
 
@@ -251,5 +251,5 @@ def test_bad_axes_are_refused(tmp_path: Path, x: str, part: str):
 )
 def test_bad_requests_are_refused(tmp_path: Path, arguments: dict[str, object], part: str):
     with pytest.raises(InputError, match=re.escape(part)):
-        diagram(swimmer(), X, Y, out=tmp_path / "d", **arguments)  # type: ignore[arg-type]
+        diagram(swimmer(), X, Y, out=tmp_path / "d", **arguments)
     assert not (tmp_path / "d").exists()

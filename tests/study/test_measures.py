@@ -104,7 +104,7 @@ def test_holding_the_height_and_stopping_at_it_are_one_branch(tmp_path: Path):
 def test_bad_control_is_one_line(options: dict[str, object], part: str):
     arguments = {"key": "height", "stop": 1.0, "start": 0.5, **options}
     with pytest.raises(InputError) as caught:
-        ss.branch(ss.scenario("membrane-protrusion", **COAT), arguments.pop("key"), arguments.pop("stop"), **arguments)  # type: ignore[arg-type]
+        ss.branch(ss.scenario("membrane-protrusion", **COAT), arguments.pop("key"), arguments.pop("stop"), **arguments)
     assert part in str(caught.value)
 
 

@@ -50,7 +50,7 @@ def test_a_stored_search_reloads_and_its_states_are_starts(stored: Search):
     again = open_search(stored.store)
     assert story(again) == story(stored)
     start = find_start(f"{stored.store}:state-2")
-    np.testing.assert_array_equal(start.frame.nodes, stored["state-2"].frame.nodes)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(start.frame.nodes, stored["state-2"].frame.nodes)
     assert [one.text for one in find_starts(stored.store, swimmer())] == [
         f"{stored.store}:state-1",
         f"{stored.store}:state-2",

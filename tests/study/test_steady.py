@@ -30,7 +30,7 @@ def test_the_resting_sphere():
     case = scenario("polar-swimmer", elements=20)
     steady = solve_steady(case, StateName.TRIVIAL)
     assert_solved(steady)
-    tension = case.parameters.tension + case.parameters.active_tension / 2.0  # type: ignore[union-attr]
+    tension = case.parameters.tension + case.parameters.active_tension / 2.0
     assert steady.observables["pressure"] == pytest.approx(2.0 * tension, rel=1e-9)
     assert abs(steady.observables["velocity"]) < 1e-9
     assert abs(steady.observables["polarity"]) < 1e-9

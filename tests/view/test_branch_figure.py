@@ -59,4 +59,4 @@ def test_along_an_observable_the_one_that_answers_is_drawn():
         ("coat_area", None, "height"),
     ):
         branch = SimpleNamespace(scenario=scenario, key=key, free=free, points=(point,))
-        assert telling_observable(branch) == name  # type: ignore[arg-type]
+        assert telling_observable(branch) == name

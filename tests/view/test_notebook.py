@@ -34,7 +34,7 @@ class Balanced(HTMLParser):
 
 
 def shown(thing: object) -> str:
-    page = thing._repr_html_()  # type: ignore[attr-defined]
+    page = thing._repr_html_()
     read = Balanced(page)
     assert read.open == []
     assert "http" not in page.replace("http://www.w3.org", "")

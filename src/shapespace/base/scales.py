@@ -209,7 +209,7 @@ class Scales:
             length_symbol=symbol,
         )
 
-    @cache  # noqa: B019 (scales are few)
+    @cache  # noqa: B019  (keeps all scales alive: they are few)
     def factor(self, name: str) -> float:
         """The unit of a quantity: its value in the user's units is this times its dimensionless value."""
         dimension = QUANTITIES[name].dimension

@@ -6,6 +6,7 @@ harmonic l = 2, the leaning l = 3 and a shift.
 
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev
@@ -94,7 +95,11 @@ class Spheroid:
     @cached_property
     def _arc_length(self) -> Array:
         """s/pi as a Chebyshev series in 2 t/pi - 1."""
-        series = chebyshev.chebinterpolate(lambda x: self.speed(0.5 * np.pi * (x + 1.0)), ORDER)  # type: ignore[type-var]
+
+        def speed(x: Any) -> Any:  # numpy's annotation asks for a function of objects
+            return self.speed(0.5 * np.pi * (x + 1.0))
+
+        series = chebyshev.chebinterpolate(speed, ORDER)
         return np.asarray(0.5 * np.pi * chebyshev.chebint(series, lbnd=-1.0))
 
     @property

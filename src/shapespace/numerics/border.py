@@ -22,7 +22,7 @@ def with_border(
 
 
 @compiled
-def _bordered(columns, rows, corner, widths, weights, n, points, ends, targets):  # type: ignore[no-untyped-def]
+def _bordered(columns, rows, corner, widths, weights, n, points, ends, targets):  # type: ignore[no-untyped-def]  # numba finds the types
     n_rows, n_columns, k, elements = points.shape
     (n_i, n_s), (n_b, end_columns), extra = targets.shape, ends.shape, corner.shape[0]
     m = n_rows - n_i

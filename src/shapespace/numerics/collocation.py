@@ -29,7 +29,7 @@ FAST = 2.0**20
 
 
 @compiled
-def _largest_relative(change, values, columns, weights):  # type: ignore[no-untyped-def]
+def _largest_relative(change, values, columns, weights):  # type: ignore[no-untyped-def]  # numba finds the types
     """max over columns of max_i |weights_i change_ic| / max(max_i |values_ic|, floor), both flat and columns wide.
 
     weights may be empty, for ones.
@@ -52,7 +52,7 @@ def _largest_relative(change, values, columns, weights):  # type: ignore[no-unty
 
 
 @compiled
-def _norm(dx, x, n, n_a, k, widths):  # type: ignore[no-untyped-def]
+def _norm(dx, x, n, n_a, k, widths):  # type: ignore[no-untyped-def]  # numba finds the types
     """Of `CollocationProblem.norm`; widths (N k,): of each point's element."""
     slopes = (widths.shape[0] // k + 1) * n
     algebraic = slopes + widths.shape[0] * n

@@ -46,7 +46,7 @@ class Factors(NamedTuple):
 
 
 @compiled
-def _any(values):  # type: ignore[no-untyped-def]
+def _any(values):  # type: ignore[no-untyped-def]  # numba finds the types
     for value in values:  # noqa: SIM110  (numba compiles loops, not generators)
         if value != 0.0:
             return True
@@ -54,7 +54,7 @@ def _any(values):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _integral_rows(  # type: ignore[no-untyped-def]
+def _integral_rows(  # type: ignore[no-untyped-def]  # numba finds the types
     widths, matrix, weights, points, position, response, pivoted, dense, local, nodes, scalars
 ):
     """Add integral rows over nodes (N + 1, n_i, n) and scalars (n_i, n_s) after condensation; `local` over the stages."""
@@ -97,7 +97,7 @@ def _integral_rows(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _eliminate_chain(relations, integral, chain, pivot):  # type: ignore[no-untyped-def]
+def _eliminate_chain(relations, integral, chain, pivot):  # type: ignore[no-untyped-def]  # numba finds the types
     """Eliminate Y_1..Y_{N-1}; returns the rows left over (Y_0, Y_N, s): n chain rows and the integral rows.
 
     The active n rows read A Y_0 + B Y_e + C s = r. Stacked with the relation of (Y_e, Y_{e+1}, s) and the integral rows they
@@ -131,7 +131,7 @@ def _eliminate_chain(relations, integral, chain, pivot):  # type: ignore[no-unty
 
 
 @compiled
-def _condense(  # type: ignore[no-untyped-def]
+def _condense(  # type: ignore[no-untyped-def]  # numba finds the types
     widths, matrix, weights, points, ends, targets, position, response, pivoted, dense, relations, integral
 ):
     """Chain and border from the relations; the factors from `chain` to `border_scale`, and whether both are regular."""
@@ -226,7 +226,7 @@ def determinant_sign(factors: Factors) -> float:
 
 
 @compiled
-def _solve_chain(chain, pivot, defect, integral, ends, border_lu, border_pivot, border_scale):  # type: ignore[no-untyped-def]
+def _solve_chain(chain, pivot, defect, integral, ends, border_lu, border_pivot, border_scale):  # type: ignore[no-untyped-def]  # numba finds the types
     """Node values (N + 1, n) and scalars (n_s,) from the condensed right-hand side."""
     n_elements, n = defect.shape
     nodes = np.empty((n_elements + 1, n))
@@ -254,7 +254,7 @@ def _solve_chain(chain, pivot, defect, integral, ends, border_lu, border_pivot, 
 
 
 @compiled
-def _add_coupling(response, pivoted, dense, x, nodes, scalars):  # type: ignore[no-untyped-def]
+def _add_coupling(response, pivoted, dense, x, nodes, scalars):  # type: ignore[no-untyped-def]  # numba finds the types
     """Turn the particular stage solution x (k m, N), in pivot order, into the stages that go with nodes and scalars."""
     size, n_elements = x.shape
     n = nodes.shape[1]
@@ -276,7 +276,7 @@ def _add_coupling(response, pivoted, dense, x, nodes, scalars):  # type: ignore[
 
 
 @compiled
-def _solve(  # type: ignore[no-untyped-def]
+def _solve(  # type: ignore[no-untyped-def]  # numba finds the types
     widths, weights, position, partner, lower, upper, work, response, scale, pivoted, dense, exchanges, relation_scale,
     chain, chain_pivot, local_integral, border_lu, border_pivot, border_scale, residual,
 ):  # fmt: skip

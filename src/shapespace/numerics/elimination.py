@@ -75,7 +75,7 @@ def make_plan(widths: Array, matrix: Array, points: Array, n: int, n_equations: 
 
 
 @compiled
-def _decades(points, m, n, reach):  # type: ignore[no-untyped-def]
+def _decades(points, m, n, reach):  # type: ignore[no-untyped-def]  # numba finds the types
     """Half the decimal logarithm of the mean size of each entry of the equations' blocks, fields times reach; (m, columns).
 
     Whole numbers, so that round-off and slow drift keep the plan.
@@ -167,7 +167,7 @@ def _operations(pattern: BoolArray) -> tuple[IntArray, IntArray, IntArray, IntAr
 
 
 @compiled
-def _fill(widths, matrix, points, n, position, partner, structure, slot, work):  # type: ignore[no-untyped-def]
+def _fill(widths, matrix, points, n, position, partner, structure, slot, work):  # type: ignore[no-untyped-def]  # numba finds the types
     """Write the scaled stage equations of all elements into their slots; returns the scaling of the rows."""
     _, columns, k, n_elements = points.shape
     m, size = partner.shape[0], position.shape[0]
@@ -202,7 +202,7 @@ def _fill(widths, matrix, points, n, position, partner, structure, slot, work): 
 
 
 @compiled
-def _update(work, operations, first, last):  # type: ignore[no-untyped-def]
+def _update(work, operations, first, last):  # type: ignore[no-untyped-def]  # numba finds the types
     for o in range(first, last):
         target, factor, source = work[operations[o, 0]], work[operations[o, 1]], work[operations[o, 2]]
         for e in range(work.shape[1]):
@@ -210,7 +210,7 @@ def _update(work, operations, first, last):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _eliminate(work, lower, scaled, operations, steps):  # type: ignore[no-untyped-def]
+def _eliminate(work, lower, scaled, operations, steps):  # type: ignore[no-untyped-def]  # numba finds the types
     """LU in place without exchanges and back-substitution of the columns beyond; returns the largest multipliers (N,)."""
     n_elements = work.shape[1]
     size = steps.shape[0] - 1
@@ -233,7 +233,7 @@ def _eliminate(work, lower, scaled, operations, steps):  # type: ignore[no-untyp
 
 
 @compiled
-def _relations(widths, weights, position, response, jumps, m):  # type: ignore[no-untyped-def]
+def _relations(widths, weights, position, response, jumps, m):  # type: ignore[no-untyped-def]  # numba finds the types
     """[-G_e | I | J_e - S_e] (N, n, 2n + n_s) of Y_{e+1} - G_e Y_e + (J_e - S_e) s = ..., J_e the jumps."""
     size, columns, n_elements = response.shape
     n = jumps.shape[1]
@@ -256,7 +256,7 @@ def _relations(widths, weights, position, response, jumps, m):  # type: ignore[n
 
 
 @compiled
-def _eliminate_pivoted(  # type: ignore[no-untyped-def]
+def _eliminate_pivoted(  # type: ignore[no-untyped-def]  # numba finds the types
     widths, weights, position, slot, filled, jumps, m, response, pivoted, dense, exchanges, relations, scale
 ):
     """Eliminate single elements with pivots from stage and continuity rows; filled (slots, M): their stage equations.
@@ -302,7 +302,7 @@ def _eliminate_pivoted(  # type: ignore[no-untyped-def]
 
 
 @compiled
-def _eliminate_all(  # type: ignore[no-untyped-def]
+def _eliminate_all(  # type: ignore[no-untyped-def]  # numba finds the types
     widths, weights, matrix, points, jumps, m, position, partner, structure, slot, lower, scaled, operations, steps
 ):  # fmt: skip
     """The fields of LocalFactors, the relations, and whether all elements are regular."""
@@ -346,7 +346,7 @@ def eliminate_stages(
 
 
 @compiled
-def solve_stages(  # type: ignore[no-untyped-def]
+def solve_stages(  # type: ignore[no-untyped-def]  # numba finds the types
     work, scale, pivoted, dense, exchanges, relation_scale, position, partner, lower, upper, widths, weights, equations,
     continuity,
 ):  # fmt: skip

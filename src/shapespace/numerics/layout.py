@@ -18,7 +18,7 @@ from shapespace.numerics.small_lu import Array, compiled, put
 
 
 @compiled
-def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, points_per_tile):  # type: ignore[no-untyped-def]
+def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, points_per_tile):  # type: ignore[no-untyped-def]  # numba finds the types
     """Tiles (n_tiles, size) of x and all else that they hold; history (N k + 2, n_q), flat, or empty for zero. Linear in x.
 
     stages (k,): the Gauss points on [0, 1]; matrix (k, k): integrals of their basis. Points beyond the last repeat it.
@@ -62,7 +62,7 @@ def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, point
 
 
 @compiled
-def assembled(values, x, mesh, weights, n, m, n_i, points_per_tile):  # type: ignore[no-untyped-def]
+def assembled(values, x, mesh, weights, n, m, n_i, points_per_tile):  # type: ignore[no-untyped-def]  # numba finds the types
     """The flat residual from what came back (n_tiles, size): equations, continuity of x, end conditions, integral conditions."""
     elements, k, size = mesh.shape[0] - 1, weights.shape[0], points_per_tile
     slopes, equations = (elements + 1) * n, elements * k * m
@@ -91,7 +91,7 @@ def assembled(values, x, mesh, weights, n, m, n_i, points_per_tile):  # type: ig
 
 
 @compiled
-def product(x, points, structure, ends, targets, mesh, matrix, weights, jumps):  # type: ignore[no-untyped-def]
+def product(x, points, structure, ends, targets, mesh, matrix, weights, jumps):  # type: ignore[no-untyped-def]  # numba finds the types
     """A collocation matrix with blocks as in `condensation.factorise` times x, flat as the residual.
 
     structure (m + n_i, m + n + n_s): which entries of `points` are not zero throughout. jumps: factor of the continuity rows.

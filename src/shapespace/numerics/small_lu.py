@@ -20,14 +20,14 @@ def read_only(array: Array) -> Array:
 
 
 @compiled
-def put(target, source):  # type: ignore[no-untyped-def]
+def put(target, source):  # type: ignore[no-untyped-def]  # numba finds the types
     """target[:] = source for vectors of one length; see copy."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
 
 @compiled
-def copy(target, source):  # type: ignore[no-untyped-def]
+def copy(target, source):  # type: ignore[no-untyped-def]  # numba finds the types
     """target[...] = source for matrices of one shape: numba compiles that for many seconds, because it may broadcast."""
     for i in range(target.shape[0]):
         for c in range(target.shape[1]):
@@ -35,7 +35,7 @@ def copy(target, source):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]
+def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]  # numba finds the types
     """LU in place of the first len(pivot) columns of a (rows, cols), pivots from the first n_pivot_rows rows.
 
     Four columns at a time: one pass over the rest of a row then does four updates. False where a pivot vanishes.
@@ -81,7 +81,7 @@ def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def forward(lu, pivot, x):  # type: ignore[no-untyped-def]
+def forward(lu, pivot, x):  # type: ignore[no-untyped-def]  # numba finds the types
     """Apply the row exchanges, then the inverse unit lower trapezoid of a (rows, columns) LU, to one column in place."""
     for j in range(pivot.shape[0]):
         p = pivot[j]
@@ -97,7 +97,7 @@ def forward(lu, pivot, x):  # type: ignore[no-untyped-def]
 
 
 @compiled
-def backward(lu, size, x):  # type: ignore[no-untyped-def]
+def backward(lu, size, x):  # type: ignore[no-untyped-def]  # numba finds the types
     """Solve U x = b in place for the leading `size` unknowns; any x beyond them is known and stays."""
     for i in range(size - 1, -1, -1):
         row = lu[i]

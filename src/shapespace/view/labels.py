@@ -20,7 +20,7 @@ def label_points(axes: Axes, labels: Sequence[tuple[str, float, float]]) -> None
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()  # settles the limits
-    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]
+    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]  # that of Agg has one
     taken = _drawn(axes)
     for text, x, y in labels:
         best, fewest, box = None, np.inf, None

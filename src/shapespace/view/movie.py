@@ -186,8 +186,8 @@ class Scene:
         self._clocks = [Clock(still, self.figure, run.dataset["time"], 0.88, 17, style.INK, self._early)]
         if self._swims:
             self._clocks.append(Clock(still, self.figure, run.dataset["velocity"], 0.79, 13, style.GREEN))
-        canvas.draw()  # type: ignore[no-untyped-call]
-        self.figure.add_artist(Backdrop(np.array(canvas.buffer_rgba())))  # type: ignore[no-untyped-call]
+        canvas.draw()  # type: ignore[no-untyped-call]  # of matplotlib
+        self.figure.add_artist(Backdrop(np.array(canvas.buffer_rgba())))  # type: ignore[no-untyped-call]  # of matplotlib
         return curve
 
     def _draw_flow_key(self, surface: Axes) -> Text | None:
