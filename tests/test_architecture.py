@@ -15,7 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from shapespace.base.scales import QUANTITIES, Dimension
+from shapespace.base.scales import QUANTITIES
+from shapespace.base.units import Dimension
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = "shapespace"

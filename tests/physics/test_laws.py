@@ -6,7 +6,7 @@ import pytest
 from numpy.testing import assert_allclose
 from tests.physics.test_terms import growing, random_site, total
 
-from shapespace.base.scales import Dimension, read_dimension
+from shapespace.base.units import Dimension, read_dimension
 from shapespace.geometry.curve import Geometry, area_element
 from shapespace.physics.admission import check_law
 from shapespace.physics.bending import HelfrichBending

@@ -6,7 +6,8 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
 from shapespace.base.outcome import Outcome
-from shapespace.base.scales import QUANTITIES, Dimension
+from shapespace.base.scales import QUANTITIES
+from shapespace.base.units import Dimension
 from shapespace.numerics.state import State
 from shapespace.study.frame import Frame
 from shapespace.study.keys import MODELS

@@ -20,17 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapespace.base.errors import InputError
+from shapespace.base.units import Dimension, Units, write_factors
 
 Value = TypeVar("Value", float, NDArray[np.float64])
-
-
-class Dimension(NamedTuple):
-    """Exponents of length, energy, time and concentration."""
-
-    length: int = 0
-    energy: int = 0
-    time: int = 0
-    concentration: int = 0
 
 
 class Quantity(NamedTuple):
@@ -58,7 +50,9 @@ _CONCENTRATION = Dimension(concentration=1)
 QUANTITIES: dict[str, Quantity] = {
     # keys of scenarios
     "bending_rigidity": Quantity("kappa", "bending rigidity", _ENERGY),
+    "mean_curvature_rigidity": Quantity("kappa_H", "rigidity of the bending energy kappa_H (H - C)^2", _ENERGY),
     "spontaneous_curvature": Quantity("C0", "spontaneous curvature", _CURVATURE),
+    "spontaneous_mean_curvature": Quantity("C", "spontaneous value of H in kappa_H (H - C)^2", _CURVATURE),
     "shear_viscosity": Quantity("eta_s", "surface shear viscosity", _VISCOSITY),
     "bulk_viscosity": Quantity("eta_b", "surface bulk viscosity", _VISCOSITY),
     "friction": Quantity("Gamma", "tangential friction with the surroundings", Dimension(-4, 1, 1)),
@@ -152,22 +146,6 @@ QUANTITIES: dict[str, Quantity] = {
 }
 
 
-def read_dimension(text: str) -> Dimension:
-    """The dimension of a unit as the glossary writes it, `E T/L^2`, `1/L`, `1`. InputError where it is none."""
-    letters = {"L": "length", "E": "energy", "T": "time", "C": "concentration"}
-    exponents = dict.fromkeys(letters.values(), 0)
-    above, _, below = text.partition("/")
-    for part, sign in ((above, 1), (below.strip("() "), -1)):
-        for factor in part.split():
-            letter, _, power = factor.partition("^")
-            if letter == "1" and not power:
-                continue
-            if letter not in letters or not (power or "1").isdigit():
-                raise InputError(f"unit = {text!r}: must be of L, E, T, C and their powers, e.g. E T/L^2.")
-            exponents[letters[letter]] += sign * int(power or 1)
-    return Dimension(**exponents)
-
-
 _RADII = {"sphere_radius": "R0", "base_radius": "R_b", "area_radius": "R_A"}
 
 
@@ -175,8 +153,8 @@ _RADII = {"sphere_radius": "R0", "base_radius": "R_b", "area_radius": "R_A"}
 class Scales:
     """The four scales of one scenario, in the user's units. All finite and > 0.
 
-    A unit string names a scale where it is the unit (its value is 1: `R0/tau`) and otherwise says in words that the
-    number is in the units in which the scenario was written (`length/time`).
+    A unit string is in the units that the scenario declares (`um/s`). Without them it names a scale where it is the unit (its
+    value is 1: `R0/tau`) and otherwise says in words that the number is in the units of the scenario (`length/time`).
     """
 
     length: float
@@ -184,6 +162,7 @@ class Scales:
     time: float
     concentration: float = 1.0
     length_symbol: str = "R0"
+    units: Units | None = None
 
     def __post_init__(self) -> None:
         for name in Dimension._fields:
@@ -195,8 +174,8 @@ class Scales:
                 )
 
     @classmethod
-    def of(cls, parameters: Mapping[str, float]) -> Self:
-        """The scales of a set of parameters, of the model to which its radius belongs."""
+    def of(cls, parameters: Mapping[str, float], units: Units | None = None) -> Self:
+        """The scales of a set of parameters, of the model to which its radius belongs; units: what their numbers are in."""
         radius, symbol = next((name, symbol) for name, symbol in _RADII.items() if name in parameters)
         length = parameters[radius]
         viscosity = parameters["shear_viscosity" if radius == "base_radius" else "bulk_viscosity"]
@@ -207,6 +186,7 @@ class Scales:
             time=viscosity * length / energy * length,
             concentration=parameters.get("reference_concentration", 1.0),
             length_symbol=symbol,
+            units=units,
         )
 
     @cache  # noqa: B019  (keeps all scales alive: they are few)
@@ -239,18 +219,14 @@ class Scales:
         return value * self.factor(name)
 
     def unit(self, name: str) -> str:
-        """The unit of a quantity as text: `R0/tau`, `kappa/R0^2`, `rad`, `1`."""
+        """The unit of a quantity as text: `R0/tau`, `kappa/R0^2`, `um/s`, `rad`, `1`."""
         return "rad" if name == "tangent_angle" else self._symbols(QUANTITIES[name].dimension)
 
     def _symbols(self, dimension: Dimension, *, words: bool = False) -> str:
+        if self.units is not None and not words:
+            return self.units.label(dimension)
         symbols = {"length": self.length_symbol, "energy": "kappa", "time": "tau", "concentration": "c0"}
-        above: list[str] = []
-        below: list[str] = []
-        for base in ("energy", "length", "time", "concentration"):
-            exponent = getattr(dimension, base)
-            symbol = base if words or getattr(self, base) != 1.0 else symbols[base]
-            power = symbol if abs(exponent) == 1 else f"{symbol}^{abs(exponent)}"
-            if exponent:
-                (above if exponent > 0 else below).append(power)
-        text = " ".join(above) or "1"
-        return f"{text}/{' '.join(below) if len(below) == 1 else '(' + ' '.join(below) + ')'}" if below else text
+        return write_factors(
+            (base if words or getattr(self, base) != 1.0 else symbols[base], getattr(dimension, base))
+            for base in ("energy", "length", "time", "concentration")
+        )

@@ -42,18 +42,30 @@ def list_scenarios() -> None:
         print(f"{name:<22}{title}")
 
 
-@app.command(help_epilogue=examples("shapespace config guided-division --out my.toml"))
+@app.command(
+    help_epilogue=examples(
+        "shapespace config guided-division --out my.toml",
+        'shapespace config vesicle --units length="10 um" --units energy="85 pN nm" --units time="1 s"',
+    )
+)
 def config(
     name: Annotated[str, Parameter(help="A built-in scenario.")],
     /,
     *,
     out: Annotated[Path | None, Parameter(help="New file to write to; the default is stdout.")] = None,
+    units: Annotated[
+        tuple[str, ...],
+        Parameter(
+            metavar="BASE=SIZE",
+            help="In physical units: how large the scenario's unit of length, energy, time or concentration is; repeat for each.",
+        ),
+    ] = (),
 ) -> None:
     """Write the commented TOML file of a built-in scenario, to be changed and given to `shapespace run`."""
     from shapespace.study.files import storage, write_atomically
     from shapespace.study.scenario import template
 
-    text = template(name)
+    text = template(name, read_settings(units, "--units", "length=10 um"))
     if out is None:
         print(text, end="")
         return

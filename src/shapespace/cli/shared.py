@@ -77,13 +77,15 @@ def tell(text: str) -> None:
     print(f"shapespace: {text}", file=sys.stderr, flush=True)
 
 
-def read_settings(settings: Sequence[str]) -> dict[str, str]:
-    """The key=value texts of -s; InputError where one is none, or a key is given twice."""
+def read_settings(settings: Sequence[str], option: str = "-s", example: str = "peclet=300") -> dict[str, str]:
+    """The key=value texts of an option; InputError where one is none, or a key is given twice."""
     changes: dict[str, str] = {}
     for text in settings:
         key, equals, value = (part.strip() for part in text.partition("="))
         if not (key and equals and value):
-            raise InputError(f"-s {text}: must be KEY=VALUE without blanks, e.g. -s peclet=300.")
+            raise InputError(
+                f"{option} {text}: must be KEY=VALUE without blanks, e.g. {option} {shlex.quote(example)}."
+            )
         if key in changes:
             raise InputError(f"{key} = {value}: is given twice, also as {changes[key]}; give it once.")
         changes[key] = value

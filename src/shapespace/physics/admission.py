@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from shapespace.base.arrays import Array, Traced
-from shapespace.base.scales import Dimension
+from shapespace.base.units import Dimension
 from shapespace.geometry.curve import Geometry
 from shapespace.geometry.motion import Rates
 from shapespace.physics.laws import Law

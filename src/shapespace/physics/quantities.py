@@ -6,7 +6,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from shapespace.base.arrays import Traced
-from shapespace.base.scales import Dimension
+from shapespace.base.units import Dimension
 from shapespace.geometry.curve import azimuthal_curvature, meridional_curvature, total_curvature
 from shapespace.geometry.motion import (
     axial_velocity,

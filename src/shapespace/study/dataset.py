@@ -17,16 +17,11 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, even_points, state_of
 from shapespace.study.frame import Frame
 from shapespace.study.observables import FLOWS
+from shapespace.study.records import CONVENTIONS
 from shapespace.study.scenario import Scenario
 from shapespace.study.store import RunStore
 
 POINTS = 241
-CONVENTIONS = (
-    "u = 0 upper pole or apex, u = 1 lower pole or rim; r' = h cos psi, z' = -h sin psi; outward normal "
-    "(sin psi, cos psi); curvatures positive on a sphere; velocities in the lab frame; at the initial time, whose state is "
-    "given and not solved for, flow, pressure and powers are those of the first step; a flat disc, whose flow has no limit "
-    "there, is at rest"
-)
 _FLOW_FIELDS = ("tangential_velocity", "normal_velocity", "azimuthal_velocity")
 
 

@@ -5,16 +5,23 @@ A key names one thing wherever it is written, so `-s key=value` needs no section
     peclet                       active_tension = peclet diffusivity bulk_viscosity / sphere_radius^2
     inverse_hydrodynamic_length  friction = bulk_viscosity (inverse_hydrodynamic_length / sphere_radius)^2
     enclosed_volume              4 pi sphere_radius^3 / 3 = enclosed_volume
+
+and for all models those of the other way to write the Helfrich energy, kappa_H (H - C)^2 for kappa/2 (2H - C0)^2:
+
+    mean_curvature_rigidity      bending_rigidity = mean_curvature_rigidity / 2
+    spontaneous_mean_curvature   spontaneous_curvature = 2 spontaneous_mean_curvature
 """
 
 import difflib
 import math
+import re
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, Literal, NamedTuple, cast, get_origin
 
 from shapespace.base.errors import InputError
 from shapespace.base.scales import QUANTITIES
+from shapespace.base.units import Dimension, Units
 from shapespace.study.parameters import (
     ClosedSurfaceInitial,
     ClosedSurfaceParameters,
@@ -47,6 +54,20 @@ class Twin(NamedTuple):
     is_open: bool = False
 
 
+_HELFRICH_TWINS = {
+    "mean_curvature_rigidity": Twin(
+        "bending_rigidity",
+        lambda p: 0.5 * p["mean_curvature_rigidity"],
+        lambda p: 2.0 * p["bending_rigidity"],
+        least=0.0,
+        is_open=True,
+    ),
+    "spontaneous_mean_curvature": Twin(
+        "spontaneous_curvature",
+        lambda p: 2.0 * p["spontaneous_mean_curvature"],
+        lambda p: 0.5 * p["spontaneous_curvature"],
+    ),
+}
 # In the order in which they are resolved: the later formulas need the radius.
 _CLOSED_TWINS = {
     "enclosed_volume": Twin(
@@ -67,6 +88,7 @@ _CLOSED_TWINS = {
         lambda p: p["sphere_radius"] * math.sqrt(p["friction"] / p["bulk_viscosity"]),
         least=0.0,
     ),
+    **_HELFRICH_TWINS,
 }
 
 
@@ -107,8 +129,8 @@ def _model(kind: str, parameters: type[Record], initial: type[Record], twins: di
 
 MODELS = {
     "closed-surface": _model("closed-surface", ClosedSurfaceParameters, ClosedSurfaceInitial, _CLOSED_TWINS),
-    "open-membrane": _model("open-membrane", OpenMembraneParameters, OpenMembraneInitial, {}),
-    "vesicle": _model("vesicle", VesicleParameters, VesicleInitial, {}),
+    "open-membrane": _model("open-membrane", OpenMembraneParameters, OpenMembraneInitial, _HELFRICH_TWINS),
+    "vesicle": _model("vesicle", VesicleParameters, VesicleInitial, _HELFRICH_TWINS),
 }
 
 
@@ -165,6 +187,59 @@ def _read_text(key: str, text: str, kind: type) -> Value:
     except ValueError:
         must = "must be a whole number" if kind is int else "must be a number"
         raise InputError(complaint(key, text, must)) from None
+
+
+def in_numbers(keys: Mapping[str, object], model: str, units: Units | None) -> dict[str, object]:
+    """The keys with every value with a unit, `20 pN nm`, as the number that it is in the declared units."""
+    return {key: _number(key, value, units) if has_unit(key, value, model) else value for key, value in keys.items()}
+
+
+def convert_keys(keys: Keys, units: Units | None, stated: Mapping[str, str]) -> tuple[dict[str, Value], Units]:
+    """The keys in other units, and those; of keys without units each text says how large the present unit is, `10 um`."""
+    if units is None:
+        new, sizes = Units.with_sizes(stated)
+
+        def factor(dimension: Dimension) -> float:
+            return math.prod(sizes.get(base, 1.0) ** power for base, power in dimension._asdict().items())
+    else:
+        new = Units.declare({**units.as_dict(), **stated})
+
+        def factor(dimension: Dimension) -> float:
+            return units.factor_to(new, dimension)
+
+    converted = {
+        key: value * factor(QUANTITIES[key].dimension) if isinstance(value, float) else value
+        for key, value in keys.items()
+    }
+    return converted, new
+
+
+def has_unit(key: str, value: object, model: str) -> bool:
+    """Whether a value is the text of a number and more, where a real number is due."""
+    check_key(key, value, model)
+    if not isinstance(value, str) or MODELS[model].type_of(key) is not float:
+        return False
+    return re.match(r"\s*[-+]?\.?\d", value) is not None and not _is_number(value)
+
+
+def _number(key: str, value: object, units: Units | None) -> float:
+    if units is None:
+        raise InputError(
+            complaint(
+                key,
+                value,
+                "must be a number, as this scenario declares no units; with a section [units] it may have one",
+            )
+        )
+    return units.read(key, str(value), QUANTITIES[key].dimension)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def replace_keys(given: Keys, changes: Mapping[str, object], model: str) -> dict[str, Value]:

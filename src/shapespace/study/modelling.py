@@ -12,7 +12,8 @@ import tomlkit
 from pydantic import Field, create_model
 
 from shapespace.base.errors import InputError
-from shapespace.base.scales import QUANTITIES, Quantity, read_dimension
+from shapespace.base.scales import QUANTITIES, Quantity
+from shapespace.base.units import read_dimension
 from shapespace.models.recipe import Recipe
 from shapespace.physics.admission import check_law
 from shapespace.physics.laws import Law

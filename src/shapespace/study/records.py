@@ -31,6 +31,16 @@ from shapespace.study.scenario import Scenario
 FORMAT_VERSION = 2
 """To be raised with every change of what is stored, of records too: others are not read."""
 
+CONVENTIONS = (
+    "u = 0 upper pole or apex, u = 1 lower pole or rim; r' = h cos psi, z' = -h sin psi; outward normal "
+    "(sin psi, cos psi); curvatures positive on a sphere, H half their sum; bending energy kappa/2 (2H - C0)^2 with "
+    "kappa = bending_rigidity and C0 = spontaneous_curvature, the same as kappa_H (H - C)^2 with "
+    "kappa_H = mean_curvature_rigidity = 2 kappa and C = spontaneous_mean_curvature = C0/2; "
+    "velocities in the lab frame; at the initial time, whose state is "
+    "given and not solved for, flow, pressure and powers are those of the first step; a flat disc, whose flow has no limit "
+    "there, is at rest"
+)
+
 _MANIFEST = "store.json"
 _LOCK = "lock"
 _FORMAT = "shapespace-"
@@ -278,6 +288,7 @@ class AbstractRecordStore(ABC, Generic[R]):
             "versions": own_versions(),
             "scales": {name: getattr(scales, name) for name in ("length", "energy", "time", "concentration")},
             "units": {name: scales.unit(name) for name in QUANTITIES},
+            "conventions": CONVENTIONS,
             "note": cls.note,
             "scenario": scenario.as_dict(),
             "status": "running",

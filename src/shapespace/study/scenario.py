@@ -15,7 +15,20 @@ from typing import Any, Self
 
 from shapespace.base.errors import InputError
 from shapespace.base.scales import Scales
-from shapespace.study.keys import MODELS, Value, check_key, is_word, make_parameters, nearest, replace_keys, twin_values
+from shapespace.base.units import Units
+from shapespace.study.keys import (
+    MODELS,
+    Value,
+    check_key,
+    convert_keys,
+    has_unit,
+    in_numbers,
+    is_word,
+    make_parameters,
+    nearest,
+    replace_keys,
+    twin_values,
+)
 from shapespace.study.parameters import (
     ClosedSurfaceInitial,
     ClosedSurfaceParameters,
@@ -48,6 +61,7 @@ class Scenario(Record, Presented):
 
     `given` holds the keys as they were written, twins included: a scenario that states `peclet` keeps its Peclet number
     when `with_overrides` changes the diffusivity. `parameters` is resolved: every physical key has its value there.
+    `units`: what all numbers are in; without them in any one consistent set.
     """
 
     name: str
@@ -57,14 +71,15 @@ class Scenario(Record, Presented):
     run: RunSettings
     numerics: Numerics
     given: tuple[tuple[str, Value], ...]
+    units: Units | None = None
 
     @classmethod
-    def from_keys(cls, name: Any, model: Any, keys: Mapping[str, object]) -> Self:
+    def from_keys(cls, name: Any, model: Any, keys: Mapping[str, object], units: Units | None = None) -> Self:
         """A scenario from keys in any order (run and numerics have defaults). InputError names the first bad key."""
         if not isinstance(name, str) or not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._-]{0,99}", name):
             raise InputError(f"name = {name!r}: must be of letters, digits, '.', '_' and '-', as it names a directory.")
         _check_model(model)
-        given = replace_keys({}, keys, model)
+        given = replace_keys({}, in_numbers(keys, model, units), model)
         sections = MODELS[model].sections
         by_section: dict[str, dict[str, Value]] = {section: {} for section in sections}
         for key, section in MODELS[model].section_of.items():
@@ -74,7 +89,7 @@ class Scenario(Record, Presented):
         records["parameters"] = make_parameters(by_section["parameters"], model)
         # In the order of the records, so that equal scenarios compare equal however they came about.
         ordered = tuple((key, given[key]) for key in MODELS[model].section_of if key in given)
-        made = cls(name=name, model=model, given=ordered, **records)
+        made = cls(name=name, model=model, given=ordered, units=units, **records)
         made.dimensionless()
         made.twins()
         return made
@@ -82,13 +97,24 @@ class Scenario(Record, Presented):
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """The scenario that `as_dict` described, bit for bit."""
-        return cls.from_keys(stored["name"], stored["model"], stored["given"])
+        units = Units(**stored["units"]) if "units" in stored else None
+        return cls.from_keys(stored["name"], stored["model"], stored["given"], units)
 
     def with_overrides(self, overrides: Mapping[str, object]) -> Self:
-        """A copy with some keys changed; a value may be text, read as the key's type."""
+        """A copy with some keys changed; a value may be text, read as the key's type, with a unit where there are units."""
         if not overrides:
             return self
-        return type(self).from_keys(self.name, self.model, replace_keys(dict(self.given), overrides, self.model))
+        changes = in_numbers(overrides, self.model, self.units)
+        return type(self).from_keys(
+            self.name, self.model, replace_keys(dict(self.given), changes, self.model), self.units
+        )
+
+    def in_units(self, **units: str) -> Self:
+        """The same experiment in other units, e.g. `in_units(length="nm", energy="pN nm", time="s")`.
+
+        Of a scenario without units a number says how large its present unit is: `in_units(length="10 um", ...)`.
+        """
+        return type(self).from_keys(self.name, self.model, *convert_keys(dict(self.given), self.units, units))
 
     def summary(self) -> Summary:
         """Model and keys with values, by section."""
@@ -108,7 +134,7 @@ class Scenario(Record, Presented):
     @property
     def scales(self) -> Scales:
         """The scales that make this scenario dimensionless."""
-        return Scales.of(self.parameters.model_dump())
+        return Scales.of(self.parameters.model_dump(), self.units)
 
     def dimensionless(self) -> dict[str, float]:
         """All real-valued keys, times included, in units of the scales: what the solver works with."""
@@ -129,12 +155,15 @@ class Scenario(Record, Presented):
         """Plain data for JSON: the keys as given, and the resolved values by section with the twins among them."""
         sections = self.sections()
         sections["parameters"] |= self.twins()
-        return {"name": self.name, "model": self.model, "given": dict(self.given), **sections}
+        units = {"units": self.units.as_dict()} if self.units else {}
+        return {"name": self.name, "model": self.model, **units, "given": dict(self.given), **sections}
 
     def difference(self, other: "Scenario") -> str | None:
         """What keeps `other` from being a continuation of this run: one phrase naming the key, or None."""
         if self.model != other.model:
             return f"model is {self.model}, not {other.model}"
+        if self.units != other.units:
+            return f"units are {_stated(self.units)}, not {_stated(other.units)}"
         mine, theirs = self.sections(), other.sections()
         for section in _SECTIONS:
             for key, value in mine[section].items():
@@ -151,8 +180,10 @@ def scenario_names() -> tuple[str, ...]:
     return (*_NAMES, *TEMPLATES)
 
 
-def template(name: str) -> str:
-    """The commented TOML text of a scenario by name."""
+def template(name: str, units: Mapping[str, str] | None = None) -> str:
+    """The commented TOML text of a scenario by name; units: as for `Scenario.in_units`."""
+    if units:
+        return _converted(template(name), units)
     if name not in scenario_names():
         load_installed()
     if name in TEMPLATES:
@@ -163,6 +194,24 @@ def template(name: str) -> str:
             f"scenario {name!r}: there is none of this name; the nearest is {close}, all: {', '.join(scenario_names())}."
         )
     return resources.files("shapespace.study").joinpath("scenarios", f"{name}.toml").read_text(encoding="utf-8")
+
+
+def _converted(text: str, units: Mapping[str, str]) -> str:
+    """A scenario's text in other units: with a section of them, and the numbers that mean the same."""
+    made = _from_text(text).in_units(**units)
+    assert made.units is not None
+    for key, value in made.given:
+        if type(value) is float:
+            # Twelve digits, so that no number ends in the round-off of a conversion.
+            number = repr(float(f"{value:.12g}"))
+            text = re.sub(rf"^{key} = \S+ *", f"{key} = {number}".ljust(42), text, count=1, flags=re.MULTILINE)
+    stated = "".join(f'{name} = "{unit}"\n' for name, unit in made.units.as_dict().items())
+    text = text.replace("\n[parameters]\n", f"\n[units]\n{stated}\n[parameters]\n", 1)
+    about = (
+        "# Units. Plain numbers are in those of the section [units]; others have their own and are in quotes, as in\n"
+        '# tension = "0.01 pN/nm". In brackets below: L length, E energy, T time, C concentration; [1] a pure number.'
+    )
+    return re.sub(r"# Units\..*?(?=\n#\n)", about, text, count=1, flags=re.DOTALL)
 
 
 def scenario(name: str, **overrides: object) -> Scenario:
@@ -210,8 +259,11 @@ def _from_text(text: str) -> Scenario:
             raise InputError(
                 f'{entry}: is missing at the top; the file is cut short or no scenario: add {entry} = "...".'
             )
-    name, model = document.pop("name"), document.pop("model")
+    name, model, stated = document.pop("name"), document.pop("model"), document.pop("units", None)
     _check_model(model)
+    if not isinstance(stated, dict | None):
+        raise InputError(f"units = {shown(stated)}: must be a section [units] with length, energy and time.")
+    units = None if stated is None else Units.declare(stated)
     keys: dict[str, object] = {}
     for section, entries in document.items():
         _check_section(section, entries, model)
@@ -222,7 +274,11 @@ def _from_text(text: str) -> Scenario:
         if key not in (*known.twins, *LATER, *keys) and rival not in keys:
             either = f"{key} (or {rival})" if rival else key
             raise InputError(f"{either}: is missing from [{section}]; the file is cut short or incomplete: add it.")
-    return Scenario.from_keys(name, model, keys)
+    return Scenario.from_keys(name, model, keys, units)
+
+
+def _stated(units: Units | None) -> str:
+    return ", ".join(units.as_dict().values()) if units else "not declared"
 
 
 def _check_model(model: object) -> None:
@@ -236,7 +292,7 @@ def _check_model(model: object) -> None:
 
 
 def _check_section(section: str, entries: object, model: str) -> None:
-    """Raise InputError unless this is a section that holds its own keys, none of them text."""
+    """Raise InputError unless this is a section that holds its own keys, none of them a number in quotes."""
     section_of = MODELS[model].section_of
     if section in section_of:
         raise InputError(f"{section} = {shown(entries)}: has no section; move it under [{section_of[section]}].")
@@ -247,6 +303,6 @@ def _check_section(section: str, entries: object, model: str) -> None:
         if section_of[key] != section:
             raise InputError(f"{key} = {shown(value)}: stands in [{section}]; move it under [{section_of[key]}].")
         # Text in a file is a slip (`peclet = "450"`); only the command line's text is read as a number.
-        if isinstance(value, str) and not is_word(key, model):
+        if isinstance(value, str) and not is_word(key, model) and not has_unit(key, value, model):
             must = {float: "a number", int: "a whole number", bool: "true or false"}[MODELS[model].type_of(key)]
             raise InputError(complaint(key, value, f"must be {must}, without quotes"))

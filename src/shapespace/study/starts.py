@@ -42,8 +42,16 @@ class Start:
         if not kept:
             return scenario
         self.check_fits(scenario)
+        self.check_units(scenario)
         values = self.scenario.values()
         return scenario.with_overrides({key: values[key] for key in kept})
+
+    def check_units(self, scenario: Scenario) -> None:
+        """InputError where values of keys would change their meaning; a scenario without units takes those of the state."""
+        if scenario.units is not None and scenario.units != self.scenario.units:
+            raise InputError(
+                f"--from {self.text}: was computed in other units than {scenario.name} declares; give one in the same."
+            )
 
     def check_fits(self, scenario: Scenario) -> None:
         """InputError unless the state has the fields that the scenario computes with."""
@@ -145,6 +153,7 @@ def find_starts(text: str | Path, scenario: Scenario) -> list[Start]:
         ]
     for start in starts:
         start.check_fits(scenario)
+        start.check_units(scenario)
     return starts
 
 

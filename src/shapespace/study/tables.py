@@ -13,10 +13,10 @@ from shapespace.base.scales import QUANTITIES
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import Branch, open_branch
 from shapespace.study.curve_store import Curve, open_curve
-from shapespace.study.dataset import CONVENTIONS, open_dataset, profile_of
+from shapespace.study.dataset import open_dataset, profile_of
 from shapespace.study.diagram_store import open_diagram
 from shapespace.study.frame import Frame
-from shapespace.study.records import noun_of
+from shapespace.study.records import CONVENTIONS, noun_of
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import open_search
 from shapespace.study.starts import find_start
