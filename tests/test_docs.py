@@ -149,7 +149,7 @@ def test_a_page_runs_in_order_and_says_where_it_failed(tmp_path: Path, monkeypat
 def shell_lines() -> list[tuple[str, str]]:
     """(page, command) of every line in a shell block, comments removed."""
     return [
-        (page.name, " ".join(words))
+        (page.name, shlex.join(words))
         for page in PAGES
         for block in blocks(page, "sh")
         for line in block.splitlines()
@@ -160,7 +160,7 @@ def shell_lines() -> list[tuple[str, str]]:
 @pytest.mark.parametrize(("page", "command"), shell_lines())
 def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_path: Path, monkeypatch: Any):
     monkeypatch.chdir(tmp_path)
-    program, *arguments = command.split()
+    program, *arguments = shlex.split(command)
     if program == "make":
         assert shutil.which("make")
         targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE)

@@ -143,6 +143,65 @@ def test_energy_law_of_the_open_membrane(order: int):
     check_order(misses, order, margin=0.25)
 
 
+DIVIDING = {"peclet": 200.0, "seed_amplitude": 0.3, "turnover_rate": 20.0}
+# What each term is alone with: bending, without which nothing sets the tangent angle, and weak viscosities.
+FAINT = {
+    "spontaneous_curvature": 0.0,
+    "tension": 0.0,
+    "active_tension": 0.0,
+    "friction": 0.0,
+    "shear_viscosity": 0.1,
+    "bulk_viscosity": 0.1,
+}
+ALONE = {
+    "bending": {},
+    "spontaneous curvature": {"spontaneous_curvature": 1.5},
+    "tension": {"tension": 30.0},
+    "active tension": {"active_tension": 60.0},
+    "shear viscosity": {"shear_viscosity": 2.0},
+    "bulk viscosity": {"bulk_viscosity": 2.0},
+    "friction": {"friction": 20.0},
+}
+
+
+@functools.cache
+def deformed() -> tuple[Engine, State]:
+    """A surface that is no sphere, with an uneven regulator."""
+    engine = make_engine("polar-swimmer", **DIVIDING)
+    return engine, state_of(march(engine, 0.1, tolerance=1e-4)[0][-1])
+
+
+def with_constants(engine: Engine, constants: dict[str, float]) -> Engine:
+    """The same system with other constants, also such as no scenario may have."""
+    p = engine.p.copy()
+    for name, value in constants.items():
+        p[engine.system.parameters.index(name)] = value
+    return replace(engine, p=p)
+
+
+def check_energy_law(engine: Engine, state: State) -> None:
+    """At second order; first the forces adapt to constants that they were not solved for."""
+    adapted = state_of(march(engine, 2e-4, state=state, tolerance=1e-3)[0][-1])
+    check_order([energy_miss(engine, 2, steps, 2e-3, adapted) for steps in (20, 40)], 2, margin=0.35)
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_energy_law_of_each_term_alone(name: str):
+    engine, state = deformed()
+    case = with_constants(engine, FAINT | ALONE[name])
+    check_energy_law(case, state)
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 8))])
+def test_energy_law_of_random_combinations(seed: int):
+    rng = np.random.default_rng(seed)
+    engine, state = deformed()
+    chosen = rng.permutation([*ALONE])[: rng.integers(2, len(ALONE))]
+    constants = {key: value * rng.uniform(0.3, 2.0) for name in chosen for key, value in ALONE[name].items()}
+    case = with_constants(engine, FAINT | constants)
+    check_energy_law(case, state)
+
+
 def friction_force(engine: Engine, x: Array) -> tuple[float, float]:
     """int Gamma v_par . e_z dA and the same of its magnitude."""
     f = stage_fields(engine, x)

@@ -188,6 +188,24 @@ def test_energy_law_closes_with_each_term_alone_and_with_all(on: tuple[str, ...]
     check_order([energy_miss(engine, 2, steps, 0.02) for steps in (10, 20, 40)], 2, margin=0.35)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_energy_law_closes_with_random_combinations(seed: int):
+    """Of these terms and of the paper's, at random strengths."""
+    rng = np.random.default_rng(seed)
+    paper = {
+        "spontaneous_curvature": 0.6,
+        "tension": 5.0,
+        "friction": 2.0,
+        "shear_viscosity": 1.5,
+        "thermal_energy": 2.0,
+    }
+    chosen = [*rng.permutation([*ALL])[: rng.integers(2, 5)], *rng.permutation([*paper])[: rng.integers(2, 6)]]
+    keys = {key: (ALL | paper)[key] * rng.uniform(0.3, 1.2) for key in chosen}
+    engine = make_engine("rich", azimuthal_flow=True, peclet=60.0 * rng.uniform(), seed_amplitude=0.3, **keys)
+    check_order([energy_miss(engine, 2, steps, 0.02) for steps in (10, 20, 40)], 2, margin=0.35)
+
+
 def test_volume_and_area_that_are_held_elastically():
     """2 (gamma + K_A (A/A0 - 1))/R = K_V (1 - V/V0) gives the radius; the energy law closes on the way there."""
     case = ss.scenario("elastic", tension=3.0)
