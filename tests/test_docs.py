@@ -189,6 +189,10 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
     }
     if function.__name__ == "run_command":
         name, changes = bound.args[0], dict(text.split("=") for text in bound.kwargs.get("settings", ()))
+        if any(
+            page == other and line.startswith("shapespace config") and name in line for other, line in shell_lines()
+        ):
+            return  # the page makes the file itself, and is run as a whole
         if name.endswith(".toml"):
             Path(name).write_text(template("guided-division"))
             load_scenario(name).with_overrides(changes)
