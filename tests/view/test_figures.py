@@ -235,7 +235,9 @@ def test_surface_of_a_sphere_fills_its_disc() -> None:
         ("1/Rb", "$1/R_{b}$"),
         ("kappa/R0**2", "$\\kappa/R_{0}^{2}$"),
         ("R_b/tau_eta", "$R_{b}/\\tau_{\\eta}$"),
-        ("um/s", "$\\mathrm{um}/\\mathrm{s}$"),
+        ("um/s", "$\\mathrm{μm}/\\mathrm{s}$"),
+        ("pN nm/um^2", "$\\mathrm{pN}\\,\\mathrm{nm}/\\mathrm{μm}^{2}$"),
+        ("kappa tau/(R0 c0)", "$\\kappa\\,\\tau/(R_{0}\\,c_{0})$"),
         ("1", ""),
     ],
 )

@@ -133,7 +133,10 @@ def math_units(units: str) -> str:
         text = f"\\{name}" if is_greek else name if index else rf"\mathrm{{{name}}}"
         return text + (f"_{{{_greek(index)}}}" if index else "") + (f"^{{{match['power']}}}" if match["power"] else "")
 
-    text = "$" + _UNIT_TOKEN.sub(token, units.replace("**", "^").replace("µ", "μ")) + "$"
+    # Mathtext drops blanks; micro is written u in files.
+    apart = re.sub(r"(?<=\w) (?=\w)", "*", units.replace("**", "^").replace("µ", "μ"))
+    apart = re.sub(r"(?<![A-Za-z])u(?=(?:m|s|g|N|M|J|Pa|l|L|mol)(?![A-Za-z]))", "μ", apart)
+    text = "$" + _UNIT_TOKEN.sub(token, apart) + "$"
     return text if _is_math(text) else units.replace("$", "")
 
 
