@@ -42,7 +42,7 @@ RUN = ROOT / "build" / "docs" / "pages"
 MADE = HERE / "made"
 
 
-def run_pages(app: Any) -> None:
+def run_changed(app: Any) -> None:
     """Run every page that changed, or whose package did, and keep the pictures that it makes."""
     if not app.config.run_pages:
         return
@@ -51,7 +51,8 @@ def run_pages(app: Any) -> None:
     for file in sorted((ROOT / "src").rglob("*.*")):
         if file.suffix in (".py", ".toml"):
             package.update(file.read_bytes())
-    for page in [ROOT / "README.md", *sorted(HERE.rglob("*.md"))]:
+    failures = []
+    for page in [*sorted(HERE.rglob("*.md")), ROOT / "README.md"]:
         if not any(block.note != "not run" for block in blocks_of(page)):
             continue
         name = "-".join(page.relative_to(ROOT).with_suffix("").parts)
@@ -62,11 +63,14 @@ def run_pages(app: Any) -> None:
             command = [sys.executable, str(HERE / "executed.py"), str(page), str(folder)]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode:
-                raise ExtensionError(f"{page.relative_to(ROOT)} does not run:\n{done.stderr}")
+                failures.append(f"{page.relative_to(ROOT)} does not run:\n{done.stderr}")
+                continue
             mark.write_text(digest)
         for picture in folder.rglob("*.png"):
             if f"made/{picture.name})" in page.read_text(encoding="utf-8"):
                 shutil.copy(picture, MADE / picture.name)
+    if failures:
+        raise ExtensionError("\n".join(failures))
 
 
 def plain_docstring(app: Any, what: str, name: str, of: Any, options: Any, lines: list[str]) -> None:
@@ -78,5 +82,5 @@ def plain_docstring(app: Any, what: str, name: str, of: Any, options: Any, lines
 def setup(app: Any) -> None:
     """Called by Sphinx; `-D run_pages=0` builds the pages without running them."""
     app.add_config_value("run_pages", True, "env", bool)
-    app.connect("builder-inited", run_pages)
+    app.connect("builder-inited", run_changed)
     app.connect("autodoc-process-docstring", plain_docstring)

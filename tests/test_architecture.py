@@ -43,7 +43,7 @@ ALLOWED: dict[str, frozenset[str]] = {
     "cli": frozenset({"base", "study", "view", "app"}),
     "app": frozenset({"base", "study", "view"}),
     # The front doors: public names re-exported, those for models of one's own, and `python -m shapespace`.
-    "__init__": frozenset({*MECHANICS, "analysis", "study", "view"}),
+    "__init__": frozenset({*MECHANICS, "analysis", "study", "view", "app"}),
     "modelling": frozenset({"physics", "study", "variational"}),
     "__main__": frozenset({"cli"}),
 }

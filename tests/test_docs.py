@@ -51,7 +51,7 @@ _built_in = ss.scenario
 def test_readme_python_runs():
     names = run_blocks(ROOT / "README.md")
     assert names["run"].outcome == "reached-end"
-    assert Path("results/my-division/store.json").exists()
+    assert Path("results/strong-ring/store.json").exists()
     assert names["data"].sizes["time"] > 2
 
 
@@ -185,6 +185,7 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
         "export",
         "explore",
         "check",
+        "reproduce",
         "verify",
     }
     if function.__name__ == "run_command":

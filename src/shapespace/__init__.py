@@ -11,6 +11,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from shapespace.app.beside import explore as explore
     from shapespace.base.errors import InputError as InputError
     from shapespace.base.errors import StoreError as StoreError
     from shapespace.base.outcome import Outcome as Outcome
@@ -71,6 +72,7 @@ _HOMES = {
     "Steady": "study.steady",
     "steady": "study.steady",
     "verify": "study.verification.table",
+    "explore": "app.beside",
     "export": "view.export",
     "stored_dataset": "study.tables",
     "movie": "view.show",

@@ -6,10 +6,11 @@ import numpy as np
 
 from shapespace.base.outcome import Outcome
 from shapespace.study.branching import branch
-from shapespace.study.diagram_store import CODES, OUTCOME, Anchors, DiagramRequest, DiagramStore
+from shapespace.study.diagram_store import CODES, OUTCOME, REGIME, Anchors, DiagramRequest, DiagramStore
 from shapespace.study.diagrams import make_request
 from shapespace.study.engine import Engine
 from shapespace.study.grid import Axis, Grid
+from shapespace.study.regimes import Regime
 from shapespace.study.run import run
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.steady import observables_at, reference
@@ -50,6 +51,7 @@ def make_map(path: Path, count: int) -> Path:
             q = grid.values(x, y)
             values = {name: np.full((1, *q.shape[:2]), known[name]) for name in names}
             values["velocity"] = made_up(q[..., 0], q[..., 1])[None]
+            values[REGIME] = np.where(values["velocity"] < -1.5, Regime.SWIMMING, Regime.RESTING).astype(np.uint8)
             values[OUTCOME] = np.full((1, *q.shape[:2]), CODES[Outcome.CONVERGED], np.int8)
             store.write_tile(tile, values)
         store.finish(Outcome.COMPLETE)

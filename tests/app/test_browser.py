@@ -133,7 +133,8 @@ def test_a_run_plays_from_its_start_to_its_end(browser: Browser, explorer: Explo
     while browser.run("document.getElementById('play').getAttribute('aria-label')") == "Pause":
         seen.add(browser.run("document.getElementById('time').value"))
     browser.settle()
-    assert len(seen) > 2
+    # A busy machine skips some.
+    assert seen - {"0", str(len(run) - 1)}
     assert shown(browser)["time"] == last.time
 
 
@@ -160,6 +161,23 @@ def test_a_map_of_many_points_shows_any_of_them(browser: Browser, explorer: Expl
     browser.press("ArrowUp")
     browser.settle()
     assert shown(browser)["inverse_hydrodynamic_length"] > numbers["inverse_hydrodynamic_length"]
+
+
+def test_regimes_are_colours_with_their_words(browser: Browser, explorer: Explorer):
+    open_page(browser, explorer, MAP, of="regime")
+    assert browser.all("#legend span", "e.textContent") == ["resting", "swimming"]
+    canvas = "document.querySelector('#diagram canvas')"
+    x, y = browser.run(
+        f"(() => {{ const b = {canvas}.getBoundingClientRect(); return [b.x + 0.1 * b.width, b.y + 0.4 * b.height]; }})()"
+    )
+    browser.move(x, y)
+    told = browser.wait("!document.getElementById('tip').hidden && document.getElementById('tip').textContent")
+    i, j = 10, 99 - 40
+    is_swimming = made_up(np.float64(10.0 + i * 10.0 / 99), np.float64(0.5 + j * 4.5 / 99)) < -1.5
+    assert told.startswith("swimming" if is_swimming else "resting")
+    pixels = browser.run(f"[...{canvas}.getContext('2d').getImageData(10, 40, 1, 1).data]")
+    sample = browser.all("#legend .kind", "getComputedStyle(e).backgroundColor")[int(is_swimming)]
+    assert sample == f"rgb({', '.join(map(str, pixels[:3]))})"
 
 
 def test_what_is_chosen_comes_back_by_its_address(browser: Browser, explorer: Explorer):

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
+from tests.app.stores import make_map
 from tests.shell import Shell, one_complaint
 
 import shapespace as ss
@@ -155,3 +156,48 @@ def test_the_command_chooses_the_form(
     assert "--vtk" in one_complaint(shell("export", stores / "run"))
     assert "give only one" in one_complaint(shell("export", stores / "run", "--vtk", "--ply"))
     assert "end it in .nc" in one_complaint(shell("export", stores / "run", "a.txt"))
+
+
+def test_a_map_is_read_back(capsys: pytest.CaptureFixture[str], tmp_path: Path):
+    """Numbers over both keys; of its surfaces only those that it stores, by their label."""
+    make_map(tmp_path / "map", 3)
+    data = ss.open_diagram(tmp_path / "map").dataset
+    stored = xr.load_dataset(ss.export(tmp_path / "map", tmp_path / "map.nc"))
+    np.testing.assert_array_equal(stored["velocity"], data["velocity"])
+    assert stored["velocity"].attrs["units"] == data["velocity"].attrs["units"]
+    table = pd.read_csv(ss.export(tmp_path / "map", tmp_path / "map.csv", form="csv"), comment="#")
+    np.testing.assert_array_equal(
+        table.set_index(["inverse_hydrodynamic_length", "peclet"])["velocity"].sort_index(),
+        data["velocity"].to_numpy().ravel(),
+    )
+    for form in ("--vtk", "--ply"):
+        told = one_complaint(Shell(capsys)("export", tmp_path / "map", tmp_path / "meshes", form))
+        assert "is a diagram, a map without surfaces; export it as netcdf or csv" in told
+    assert not (tmp_path / "meshes").exists()
+    series = ss.export(f"{tmp_path / 'map'}:trivial-0", tmp_path / "one", form="vtk")
+    assert len([*ET.fromstring(series.read_bytes()).iter("DataSet")]) == 1
+
+
+@pytest.mark.slow
+def test_curves_and_searches_are_read_back(stores: Path, tmp_path: Path):
+    """Both parameters of every point of a curve, and all states of a search, with their surfaces in every form."""
+    key = "saturation_concentration"
+    start = ss.find_start(f"{stores / 'branch'}:pitchfork-1")
+    value = start.scenario.values()[key]
+    curve = ss.curve(f"{stores / 'branch'}:pitchfork-1", key, 1.1 * value, out=tmp_path / "curve")
+    search = ss.search_states(ss.scenario("polar-swimmer", elements=20, peclet=23.0), out=tmp_path / "search")
+    assert len(curve.points) > 1
+    assert len(search.states) > 1
+    for name, count in (("curve", len(curve.points)), ("search", len(search.states))):
+        data = xr.load_dataset(ss.export(tmp_path / name, tmp_path / f"{name}.nc"))
+        table = pd.read_csv(ss.export(tmp_path / name, tmp_path / f"{name}.csv", form="csv"), comment="#")
+        assert data.sizes["state"] == len(table) == count
+        np.testing.assert_array_equal(table["area"], data["area"])
+        for form, ending in (("vtk", "vtp"), ("ply", "ply")):
+            ss.export(tmp_path / name, tmp_path / f"{name}-{form}", form=form)
+            assert len([*(tmp_path / f"{name}-{form}").glob(f"*.{ending}")]) == count
+    stored = xr.load_dataset(tmp_path / "curve.nc")
+    for i, name in enumerate(curve.keys):
+        np.testing.assert_array_equal(stored[name], [point.parameters[i] for point in curve.points])
+    energies = [one.frame.observables["bending_energy"] for one in search.states if one.frame]
+    np.testing.assert_array_equal(xr.load_dataset(tmp_path / "search.nc")["bending_energy"], energies)

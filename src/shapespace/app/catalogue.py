@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from threading import Event, Lock
 from typing import TYPE_CHECKING, Any
 
 from shapespace.base.errors import InputError, StoreError
@@ -21,13 +22,17 @@ class Catalogue:
             raise InputError("no store: give the directory of a run, a branch, a curve, a search or a diagram.")
         self.paths = [*paths]
         self._sources: list[AbstractSource | None] = [None for _ in paths]
+        self._opening = Lock()
+        self.is_shown = Event()
+        """Whether a page has all that it shows first, but for the shape."""
 
     def source(self, number: int) -> "AbstractSource":
         """A store by number. StoreError where it is none, or of a kind that is not known."""
-        known = self._sources[number]
-        if known is None:
-            known = self._sources[number] = _source(self.paths[number])
-        return known
+        with self._opening:
+            known = self._sources[number]
+            if known is None:
+                known = self._sources[number] = _source(self.paths[number])
+            return known
 
     def answer(self, name: str, asked: Mapping[str, str]) -> Answer:
         """The answer to a question. InputError where there is none."""
@@ -42,7 +47,10 @@ class Catalogue:
         }
         if name not in questions:
             raise InputError(f"{name[:20]!r}: is no question; ask one of {', '.join(questions)}.")
-        return questions[name](asked)
+        answer = questions[name](asked)
+        if name == "state":
+            self.is_shown.set()
+        return answer
 
     def stores(self) -> Answer:
         """All stores by name; of one that cannot be read, why."""

@@ -3,6 +3,7 @@
 import secrets
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from shapespace.app.page import question, single_file
 from shapespace.base.errors import InputError
 from shapespace.study.files import storage, write_atomically
 
+UNDISTURBED = 3.0
+"""Seconds after which what computes is loaded though no page has come yet."""
 MOST_STATES = 4000
 """Of all stores in one file: each state takes some kilobytes."""
 
@@ -61,13 +64,15 @@ class Explorer:
         self._socket.close()
 
     def _prepare(self) -> None:
-        """Load what the first click needs while the browser still opens."""
+        """Read what the page shows first while the browser still opens; load what computes when that is shown."""
         for number in range(len(self.catalogue.paths)):
-            try:
-                source = self.catalogue.source(number)
-                source.state(next(source.places()))
-            except (InputError, StopIteration):
-                continue
+            with suppress(InputError):
+                self.catalogue.source(number).overview()
+            if number == 0:
+                self.catalogue.is_shown.wait(UNDISTURBED)
+        for number in range(len(self.catalogue.paths)):
+            with suppress(InputError, StopIteration):
+                self.catalogue.source(number).warm()
 
 
 def export(stores: Sequence[str | Path], file: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:

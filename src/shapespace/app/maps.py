@@ -1,7 +1,9 @@
 """Diagrams for the page: one map at a time, the numbers at a point, and its shape, which is computed again."""
 
+import asyncio
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,7 @@ from shapespace.study.curve_store import Curve, outline
 from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, OUTCOME, REGIME, UNSTABLE, Diagram, DiagramStore
 from shapespace.study.files import storage
 from shapespace.study.frame import Array, Frame
+from shapespace.study.regimes import describe, telling_aspects
 from shapespace.study.scenario import Scenario
 from shapespace.study.telling import most_telling
 
@@ -40,10 +43,12 @@ class DiagramSource(AbstractSource):
         super().__init__(path)
         self._states: DiagramStates | None = None
         self._arrays: dict[str, Any] | None = None
+        self._read: dict[str, Array] = {}
 
     def forget(self) -> None:
         super().forget()
         self._states = self._arrays = None
+        self._read = {}
 
     def store(self) -> DiagramStore:
         store = super().store()
@@ -53,7 +58,7 @@ class DiagramSource(AbstractSource):
     def content(self) -> dict[str, Any]:
         store = self.store()
         request, scenario = store.request, store.scenario
-        names = [name for name in self.arrays() if name not in (OUTCOME, REGIME, *ABOUT_SOLUTION)]
+        names = [name for name in self.arrays() if name not in (OUTCOME, *ABOUT_SOLUTION)]
         outcomes = self._values(OUTCOME)
         found = outcomes == IS_STATE
 
@@ -80,8 +85,22 @@ class DiagramSource(AbstractSource):
         """One observable on all points (state, y, x), NaN where there is no state."""
         if name not in self.arrays():
             raise InputError(f"{name[:60]}: is no observable of this diagram.")
+        if name == REGIME:
+            return self._regimes()
         values = np.where(self._values(OUTCOME) == IS_STATE, self._values(name), np.nan)
         return {"name": name, "values": exact(values)}
+
+    def _regimes(self) -> dict[str, Any]:
+        """What each state is like, in the aspects that differ somewhere; kinds: what numbers mean, in words and as a colour."""
+        # Imported late: it brings the library of pictures.
+        from shapespace.view.style import GREY, REGIMES
+
+        codes = np.where(self._values(OUTCOME) == IS_STATE, self._values(REGIME), 0)
+        aspects = int(telling_aspects([*map(int, np.unique(codes[codes > 0]))]))
+        kinds = [int(code) for code in np.unique(codes & aspects) if code]
+        colours = [one for one in REGIMES if one != GREY]
+        about = [[code, describe(code), colours[i % len(colours)]] for i, code in enumerate(kinds)]
+        return {"name": REGIME, "values": exact(np.where(codes > 0, codes & aspects, np.nan)), "kinds": about}
 
     def state(self, place: str) -> dict[str, Any]:
         number, i, j = self._place(place)
@@ -89,9 +108,7 @@ class DiagramSource(AbstractSource):
         request = store.request
         keys = request.grid.keys
         x, y = request.grid.values(i, j).ravel().tolist()
-        there = {
-            name: float(array[(number, j, i) if array.ndim == 3 else (j, i)]) for name, array in self.arrays().items()
-        }
+        there = self._numbers_at(number, i, j)
         code = int(there.pop(OUTCOME))
         reason = next((outcome for outcome, known in CODES.items() if known == code), None)
         unstable = there.pop(UNSTABLE, np.nan)
@@ -127,6 +144,9 @@ class DiagramSource(AbstractSource):
                 continue
             yield "shape", {"place": place}
 
+    def warm(self) -> None:
+        self.shape(next(self.places()))
+
     def _strides(self) -> tuple[int, int]:
         """Every how many points along x and y a file has a shape."""
         store = self.store()
@@ -139,13 +159,15 @@ class DiagramSource(AbstractSource):
         # Imported late, as below: most stores are opened without a solver.
         from shapespace.study.dataset import profile_of
 
-        found = self.states().state(self._place(place))
-        at, frame = found.scenario, found.frame
+        with self.computing:
+            found = self.states().state(self._place(place))
+            at, frame = found.scenario, found.frame
+            fields = profile_of(at, frame)
         request = self.store().request
         return described(
             at,
             frame,
-            profile_of(at, frame),
+            fields,
             f"{self.path.resolve()}:{self.states().origin(self._place(place))}",
             vary=request.grid.x.key,
             stop=request.grid.x.stop,
@@ -183,7 +205,7 @@ class DiagramSource(AbstractSource):
         return state, i, j
 
     def arrays(self) -> dict[str, Any]:
-        """What is stored at each point (y, x) or (state, y, x), to read; observables in the order of the glossary."""
+        """What is stored at each point (y, x) or (state, y, x), to read part by part; observables in the glossary's order."""
         self.store()
         if self._arrays is None:
             with storage(self.path):
@@ -199,14 +221,42 @@ class DiagramSource(AbstractSource):
 
     def _values(self, name: str) -> Array:
         """An array (state, y, x)."""
-        values = np.asarray(self.arrays()[name][...])
-        return values.reshape(-1, *values.shape[-2:])
+        arrays = self.arrays()
+        if name in self._read:
+            return self._read[name]
+        values = np.asarray(arrays[name][...])
+        values = values.reshape(-1, *values.shape[-2:])
+        if self.store().outcome is not None:
+            # Of a diagram that is still being computed it would grow old.
+            self._read[name] = values
+        return values
+
+    def _numbers_at(self, number: int, i: int, j: int) -> dict[str, float]:
+        """All arrays at a point, of which only the parts that hold it are read, all at once."""
+        arrays = self.arrays()
+        there = {name: float(values[min(number, len(values) - 1), j, i]) for name, values in self._read.items()}
+        missing = [name for name in arrays if name not in there]
+        numbers = _numbers([arrays[name] for name in missing], [(number, j, i), (j, i)])
+        there |= zip(missing, numbers, strict=True)
+        return {name: there[name] for name in arrays}
+
+
+def _numbers(arrays: Sequence[Any], places: Sequence[tuple[int, ...]]) -> list[float]:
+    """What each array has at that place which has as many indices as it has dimensions."""
+    at = {len(place): place for place in places}
+
+    async def read() -> list[Any]:
+        return await asyncio.gather(*(array.async_array.getitem(at[array.ndim]) for array in arrays))
+
+    # In a thread of its own, since a notebook has a loop of events in this one.
+    with ThreadPoolExecutor(1) as pool:
+        return [float(one) for one in pool.submit(asyncio.run, read()).result()]
 
 
 def _boundary(curve: Curve) -> dict[str, Any]:
     """A curve in the plane of the map, with its named points; its keys come in the order of the map's axes."""
     x, y = outline(curve.points)
-    named = [one for one in curve.special_points if one.kind not in ("end", "user")]
+    named = [one for one in curve.special_points if one.kind not in ("end", "user", *Outcome)]
     return {
         "of": curve.of,
         "keys": curve.keys,

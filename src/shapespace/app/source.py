@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from threading import RLock
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -36,6 +37,8 @@ class AbstractSource(ABC):
         self._stamp: tuple[int, ...] = ()
         self._open: AbstractRecordStore[Any] | None = None
         self._computed: OrderedDict[str, Modes] = OrderedDict()
+        self.computing = RLock()
+        """Held by what computes: the page asks several things at once, and each would compile the same."""
 
     def store(self) -> AbstractRecordStore[Any]:
         """The store, to read, as it is now. StoreError where it is damaged."""
@@ -72,6 +75,10 @@ class AbstractSource(ABC):
     @abstractmethod
     def resting(self, place: str) -> tuple[Scenario, Frame]:
         """A state at rest whose modes may be computed. InputError where it does not rest, or rests under a control."""
+
+    def warm(self) -> None:
+        """Load what showing a state needs. InputError, StopIteration where there is none."""
+        self.state(next(self.places()))
 
     def questions(self) -> Iterator[tuple[str, dict[str, str]]]:
         """Questions that a file of this store must answer, beside the overview: of every state, and its stored modes."""
@@ -125,6 +132,10 @@ class AbstractSource(ABC):
         stored = self.modes(place)
         if stored is not None:
             return stored
+        with self.computing:
+            return self._computed_modes(place)
+
+    def _computed_modes(self, place: str) -> "Modes":
         if place not in self._computed:
             # Imported late: solvers take seconds to load, and most states are only looked at.
             from shapespace.study.steady import modes_near

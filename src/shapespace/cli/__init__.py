@@ -24,20 +24,22 @@ from shapespace.cli import explorer as explorer  # isort: skip
 from shapespace.cli import checking as checking  # isort: skip
 from shapespace.cli import verifying as verifying  # isort: skip
 from shapespace.cli import reproducing as reproducing  # isort: skip
+from shapespace.cli.guide import page_for
 from shapespace.cli.shared import BAD_INPUT, INTERRUPTED, app, tell
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit status."""
+    given = sys.argv[1:] if arguments is None else arguments
     try:
-        tokens = _spread(_imported(sys.argv[1:] if arguments is None else arguments))
+        tokens = _spread(_imported(given))
         status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
         sys.stdout.flush()
     except InputError as error:
-        tell(str(error))
+        tell(f"{error} (More: {page_for(given, error)})")
         return BAD_INPUT
     except CycloptsError as error:
-        tell(f"{' '.join(str(error).split())} See `shapespace --help`.")
+        tell(f"{' '.join(str(error).split())} See `shapespace --help`, and {page_for(given)}.")
         return BAD_INPUT
     except KeyboardInterrupt:
         tell("interrupted.")

@@ -108,19 +108,17 @@ def movie(
     *,
     out: Annotated[Path | None, Parameter(metavar="FILE", help="Movie file; the default is DIR/movie.mp4.")] = None,
 ) -> None:
-    """Make a movie of a stored run, as .mp4 or .gif; a gif where there is no ffmpeg."""
+    """Make a movie of a stored run, or of the states along a branch, as .mp4 or .gif; a gif where there is no ffmpeg."""
     from rich.console import Console
     from rich.progress import Progress
 
-    from shapespace.study.dataset import open_dataset
-    from shapespace.view.movie import save_movie
+    from shapespace.view.show import movie as save_movie
 
-    dataset = open_dataset(store)
     console = Console(stderr=True)
     with Progress(console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("drawing frames", total=None)
         written = save_movie(
-            dataset, out or store / "movie.mp4", lambda done, total: bar.update(task, completed=done, total=total)
+            store, out or store / "movie.mp4", lambda done, total: bar.update(task, completed=done, total=total)
         )
     print(written)
 

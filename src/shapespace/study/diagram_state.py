@@ -21,6 +21,8 @@ KEPT = 64
 """States to go on from: those beside a known one are a few Newton steps away."""
 SHORTEST = 1.0 / 16.0
 """Of the way from a known state that is worth a step, before the tile is computed again."""
+_CHECKED = ("area", "length")
+"""Of a state that is computed again, against what is stored."""
 
 Place = tuple[int, int, int]
 """Number of the state, and of the values along x and y."""
@@ -34,8 +36,12 @@ class DiagramStates:
         self._diagram = open_diagram(path)
         self._grid = self._store.request.grid
         self._anchors = [*self._store]
+        grid = self._grid
+        self._middles = np.array([(grid.x.anchors[i], grid.y.anchors[j]) for i, j in grid.tiles])
+        self._found = [np.flatnonzero([one is Outcome.CONVERGED for one in of.outcomes]) for of in self._anchors]
         self._surveyor = Surveyor(self._store.scenario, self._grid.keys, stability=False)
-        self._arrays: Any = zarr.open_group(path, mode="r")
+        group: Any = zarr.open_group(path, mode="r")
+        self._arrays = {name: group[name] for name in (OUTCOME, *_CHECKED)}
         self._known: OrderedDict[Place, Stationary] = OrderedDict()
 
     def scenario_at(self, place: Place) -> Scenario:
@@ -62,11 +68,9 @@ class DiagramStates:
 
     def anchor(self, place: Place) -> int | None:
         """The number of the nearest tile in whose middle the state is stored, None where there is none."""
-        anchors = self._anchors[place[0]] if place[0] < len(self._anchors) else None
-        if anchors is None:
+        if place[0] >= len(self._anchors) or not len(known := self._found[place[0]]):
             return None
-        known = [number for number, outcome in enumerate(anchors.outcomes) if outcome is Outcome.CONVERGED]
-        return min(known, key=lambda number: self._distance(self._middle(number), place), default=None)
+        return int(known[np.abs(self._middles[known] - place[1:]).sum(axis=1).argmin()])
 
     def origin(self, place: Place) -> str | None:
         """The label of the nearest stored state that the diagram was computed from, None where there is none."""
@@ -86,7 +90,8 @@ class DiagramStates:
             key=lambda one: self._distance((one[1], one[2]), place),
             default=None,
         )
-        middle = self._middle(number)
+        i, j = self._middles[number].tolist()
+        middle = i, j
         if near is not None and self._distance((near[1], near[2]), place) <= self._distance(middle, place):
             start = self._known[near]
         else:
@@ -101,18 +106,12 @@ class DiagramStates:
         """Whether a state is that of the diagram; of the store only this point is read."""
         assert isinstance(found.problem, KeyedProblem)
         mine = observables_at(self.scenario_at(place), found.problem.base, found.x)
-        return all(
-            abs(mine[name] - self._stored(name, place)) <= TELLING * abs(mine[name]) for name in ("area", "length")
-        )
+        return all(abs(mine[name] - self._stored(name, place)) <= TELLING * abs(mine[name]) for name in _CHECKED)
 
     def _stored(self, name: str, place: Place) -> float:
         """What the store has at a point; only this is read of it."""
         number, i, j = place
         return float(self._arrays[name][(number, j, i) if len(self._store.request.labels) > 1 else (j, i)])
-
-    def _middle(self, tile: int) -> tuple[int, int]:
-        i, j = self._grid.tiles[tile]
-        return int(self._grid.x.anchors[i]), int(self._grid.y.anchors[j])
 
     @staticmethod
     def _distance(one: tuple[int, int], place: Place) -> int:

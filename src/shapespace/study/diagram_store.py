@@ -12,10 +12,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import xarray as xr
 import zarr
 from numpy.typing import NDArray
 
@@ -30,6 +29,9 @@ from shapespace.study.presenting import Plotted, Summary
 from shapespace.study.records import AbstractRecordStore, holds_store
 from shapespace.study.regimes import Regime
 from shapespace.study.scenario import Scenario
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 OUTCOME, UNSTABLE, REGIME, COUNT = "outcome", "n_unstable", "regime", "n_states"
 _OUTCOMES = (
@@ -287,8 +289,11 @@ class Diagram(Plotted):
     store: Path
 
     @cached_property
-    def dataset(self) -> xr.Dataset:
+    def dataset(self) -> "xr.Dataset":
         """Dimensions named as the two keys (and `state` where several are asked), a variable for each observable."""
+        # Imported late: it takes half a second to load, and the explorer reads without it.
+        import xarray as xr
+
         return xr.open_zarr(self.store).load()
 
     def summary(self) -> Summary:

@@ -3,6 +3,7 @@
 import math
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from typing import Any, Self
 
@@ -45,7 +46,7 @@ class Axis:
             raise InputError(f"{flag} {text}: COUNT must be a whole number, e.g. {flag} peclet=25:300:40.") from None
         return cls(match[1], start, stop, count)
 
-    @property
+    @cached_property
     def values(self) -> Array:
         """(count,)."""
         return np.linspace(self.start, self.stop, self.count)
@@ -69,7 +70,7 @@ class Axis:
         """The points of a tile along this axis."""
         return slice(number * self.edge, min((number + 1) * self.edge, self.count))
 
-    @property
+    @cached_property
     def anchors(self) -> Array:
         """The middle point of each tile."""
         spans = [self.span(number) for number in range(self.tiles)]
@@ -96,7 +97,7 @@ class Grid:
         """Points along x and y."""
         return self.x.count, self.y.count
 
-    @property
+    @cached_property
     def tiles(self) -> list[tuple[int, int]]:
         """All tiles, those of one y after another."""
         return [(i, j) for j, i in product(range(self.y.tiles), range(self.x.tiles))]

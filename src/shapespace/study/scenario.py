@@ -9,6 +9,7 @@ import difflib
 import re
 import tomllib
 from collections.abc import Mapping
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any, Self
@@ -216,7 +217,14 @@ def _converted(text: str, units: Mapping[str, str]) -> str:
 
 def scenario(name: str, **overrides: object) -> Scenario:
     """A built-in scenario with some keys changed, e.g. `scenario("guided-division", peclet=300, until=1)`."""
-    return _from_text(template(name)).with_overrides(overrides)
+    made = _shipped(name) if name in _NAMES else _from_text(template(name))
+    return made.with_overrides(overrides)
+
+
+@cache
+def _shipped(name: str) -> Scenario:
+    """A scenario of the package, which does not change."""
+    return _from_text(template(name))
 
 
 def load_scenario(path: str | Path) -> Scenario:

@@ -35,7 +35,9 @@ def stored_dataset(text: str | Path) -> xr.Dataset:
     if noun == "curve":
         return curve_dataset(open_curve(path))
     if noun == "diagram":
-        return open_diagram(path).dataset
+        data = open_diagram(path).dataset
+        # NetCDF takes words and numbers; Zarr takes what JSON does.
+        return data.assign_attrs({name: _plain(value) for name, value in data.attrs.items()})
     if noun == "search":
         search = open_search(path)
         frames = [one.frame for one in search.states if one.frame]
@@ -101,6 +103,10 @@ def _described(data: xr.Dataset, path: Branch | Curve) -> xr.Dataset:
     data["arclength"] = (STATE, np.array([point.place for point in path.points]), {"long_name": "along the path"})
     outcome = str(path.outcome) if path.outcome else "unfinished"
     return data.assign_attrs(outcome=outcome, parameters=json.dumps(path.scenario.values()))
+
+
+def _plain(value: object) -> object:
+    return value if isinstance(value, str | int | float) else json.dumps(value)
 
 
 def _rates(point: BranchPoint) -> NDArray[np.float64]:

@@ -26,7 +26,7 @@ def draw_curve(axes: Axes, run: Run, name: str, words: str, twin: str | None, ma
     values, colour = observable(run.dataset, name), colour_of(name)
     axes.plot(run.time, values, color=colour, zorder=3)
     axes.plot(run.time[marked], values[marked], "o", color=colour, markersize=4, markeredgecolor="white", zorder=4)
-    axes.set_xlabel(style.axis_label(run.dataset["time"], words="time"))
+    axes.set_xlabel(style.axis_label(run.dataset["time"], words=run.dataset["time"].attrs.get("words", "time")))
     axes.set_ylabel(style.axis_label(run.dataset[name], words=words or words_of(name)), color=colour)
     axes.tick_params(axis="y", labelcolor=colour)
     _scale_time(axes, run, values)

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
@@ -14,6 +15,7 @@ from shapespace.study.dataset import open_dataset
 from shapespace.study.diagram_store import Diagram, open_diagram
 from shapespace.study.modes import find_modes
 from shapespace.study.records import noun_of
+from shapespace.study.tables import branch_dataset
 from shapespace.view.branch import plot_branch
 from shapespace.view.budget import plot_budget
 from shapespace.view.curve import plot_curve
@@ -39,6 +41,29 @@ def _dataset_of(source: Source) -> xr.Dataset:
     if isinstance(source, xr.Dataset):
         return source
     return open_dataset(source) if isinstance(source, str | Path) else source.dataset
+
+
+def _film_of(source: Source | Branch) -> xr.Dataset:
+    """What a movie shows: a run over time, or the states along a branch, where the key takes the place of time.
+
+    Where the branch turns, so that a value of the key comes twice, its arclength does.
+    """
+    if isinstance(source, str | Path) and noun_of(source) == "branch":
+        source = open_branch(source)
+    if not isinstance(source, Branch):
+        return _dataset_of(source)
+    data = branch_dataset(source)
+    steps = np.diff(data["arclength"])
+    data = data.isel(state=np.flatnonzero(np.concatenate([[True], steps > 0.0])))
+    along = data[source.key]
+    change = np.diff(along)
+    if (change < 0.0).all():
+        data = data.isel(state=slice(None, None, -1))
+        along, change = data[source.key], -change
+    if not (change > 0.0).all():
+        along = data["arclength"].assign_attrs(symbol="s", units="1")
+    words = {"words": str(along.name).replace("_", " ")}
+    return data.assign_coords(time=("state", along.to_numpy(), along.attrs | words)).swap_dims(state="time")
 
 
 _OPENED: dict[str, Callable[[str | Path], Branch | Curve | Diagram]] = {
@@ -89,6 +114,6 @@ def plot(
     return figure
 
 
-def movie(source: Source, out: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
-    """Write the movie of a run as .mp4, or .gif where there is no ffmpeg; returns the path written."""
-    return save_movie(_dataset_of(source), Path(out), progress)
+def movie(source: Source | Branch, out: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
+    """Write the movie of a run, or of the states along a branch, as .mp4, or .gif without ffmpeg; returns the path written."""
+    return save_movie(_film_of(source), Path(out), progress)

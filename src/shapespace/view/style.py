@@ -25,7 +25,8 @@ INK = "#222222"
 FAINT = "#B8BDC4"
 MEMBRANE = "#C3CAD3"
 COAT = "#F5C518"
-REGIMES = ("#BFD9EC", "#F6D5A6", "#A9A9B0", "#CDE5C4", "#DCCBE8", "#F2C4C0", "#F3EBAE", "#93C7C2")
+GREY = "#A9A9B0"
+REGIMES = ("#BFD9EC", "#F6D5A6", GREY, "#CDE5C4", "#DCCBE8", "#F2C4C0", "#F3EBAE", "#93C7C2")
 """Of regions, so pale that lines show on them, and of different lightness."""
 
 _RC: dict[Any, Any] = {

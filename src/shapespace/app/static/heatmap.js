@@ -10,10 +10,35 @@ import { placeOf, session } from "./session.js";
 import { make } from "./svg.js";
 import { hideTip, showTip } from "./tip.js";
 import { view } from "./view.js";
-import { html, number, safe } from "./words.js";
+import { escaped, html, number, safe } from "./words.js";
 
 const IS_STATE = 1;
 const NOT_COMPUTED = 0;
+
+/** Red, green, blue and opacity of a value, from 0 to 255. */
+function tableColours(scale) {
+  const colours = Uint8ClampedArray.from(table(scale.map), (share) => 255 * share);
+  const found = new Uint8ClampedArray(4).fill(255);
+  return (value) => {
+    const from = 3 * row(value, scale);
+    for (let c = 0; c < 3; c++) found[c] = colours[from + c];
+    return found;
+  };
+}
+
+function kindColours(kinds) {
+  const colours = new Map(kinds.map(([code, , hex]) => [code, [1, 3, 5].map((i) => parseInt(hex.slice(i, i + 2), 16)).concat(255)]));
+  return (value) => colours.get(value);
+}
+
+function sampleOf([, words, colour]) {
+  const one = document.createElement("span");
+  const square = document.createElement("i");
+  square.className = "bar kind";
+  square.style.background = colour;
+  one.append(square, words);
+  return one;
+}
 
 export class Heatmap extends Chart {
   constructor(host, tools, legend) {
@@ -58,8 +83,8 @@ export class Heatmap extends Chart {
     this.tools.replaceChildren(...tools);
     const wanted = name;
     await session.attempt("", async () => {
-      const { values } = await recall("values", { store: view.get("store"), name });
-      if (this.map && wanted === this.name) this.values = values;
+      const { values, kinds } = await recall("values", { store: view.get("store"), name });
+      if (this.map && wanted === this.name) Object.assign(this, { values, kinds });
     });
     this.due();
   }
@@ -87,6 +112,7 @@ export class Heatmap extends Chart {
     this.pointer = make("g");
     this.overlay.append(this.marker, this.pointer);
     this.mark();
+    session.tell("painted");
   }
 
   /** One pixel for each point, blown up by the browser. */
@@ -105,7 +131,7 @@ export class Heatmap extends Chart {
       if (value > high) high = value;
     }
     const scale = scaleFor(low, high, view.get("mapcolours"), this.name);
-    const colours = table(scale.map);
+    const colourOf = this.kinds ? kindColours(this.kinds) : tableColours(scale);
     const image = new ImageData(nx, ny);
     const hatch = document.documentElement.dataset.theme === "dark" ? [62, 70, 82] : [214, 213, 207];
     for (let j = 0; j < ny; j++) {
@@ -113,8 +139,7 @@ export class Heatmap extends Chart {
         const k = j * nx + i;
         const to = 4 * ((ny - 1 - j) * nx + i);
         if (Number.isFinite(values[k])) {
-          const from = 3 * row(values[k], scale);
-          for (let c = 0; c < 3; c++) image.data[to + c] = 255 * colours[from + c];
+          image.data.set(colourOf(values[k]), to);
           image.data[to + 3] = 255;
         } else if (codes[k] !== NOT_COMPUTED) {
           for (let c = 0; c < 3; c++) image.data[to + c] = hatch[c];
@@ -131,7 +156,7 @@ export class Heatmap extends Chart {
     const bar = document.createElement("span");
     bar.innerHTML = `<b>${safe(this.name)} ${html(symbol)}</b> <b>${number(scale.low, 4)}</b>`
       + `<i class="bar" style="background:${gradient(scale)}"></i><b>${number(scale.high, 4)} ${unit === "1" ? "" : html(unit)}</b>`;
-    this.legend.replaceChildren(bar);
+    this.legend.replaceChildren(...(this.kinds ? this.kinds.map(sampleOf) : [bar]));
     if (codes.some((code) => code !== IS_STATE && code !== NOT_COMPUTED)) {
       const none = document.createElement("span");
       none.innerHTML = '<i class="bar none"></i> no state';
@@ -150,7 +175,8 @@ export class Heatmap extends Chart {
     for (const { of, x: first, y: second, keys, labels } of this.map.boundaries ?? []) {
       const isTurned = keys[0] === this.map.y.key;
       const [x, y] = isTurned ? [second, first] : [first, second];
-      layer.append(this.path(x, y, { class: `boundary ${of}` }));
+      // A rim in the colour of the page, as the line must show on every colour of the map.
+      layer.append(this.path(x, y, { class: "boundary rim" }), this.path(x, y, { class: `boundary ${of}` }));
       for (let k = 0; k < x.length; k++) drawn.push([this.x(x[k]), this.y(y[k])]);
       for (const [text, a, b] of labels) {
         const [px, py] = isTurned ? [this.x(b), this.y(a)] : [this.x(a), this.y(b)];
@@ -195,7 +221,9 @@ export class Heatmap extends Chart {
     const k = (this.layer * y.values.length + j) * x.values.length + i;
     const { unit } = session.quantity(this.name);
     const isCount = this.name === "n_unstable";
+    const kind = this.kinds?.find(([code]) => code === this.values[k]);
     const value = outcomes[k] !== IS_STATE ? `<b>${meanings[outcomes[k]]?.[0] ?? "not computed"}</b>`
+      : kind ? `<b>${escaped(kind[1])}</b>`
       : isCount ? `<b>${stabilityWords(Number.isFinite(this.values[k]) ? this.values[k] : null)}</b>`
       : `<b>${safe(this.name)} ${number(this.values[k])}</b> ${unit === "1" ? "" : html(unit)}`;
     showTip(event, `${value}<br>${safe(x.key)} ${number(x.values[i])}<br>${safe(y.key)} ${number(y.values[j])}`);

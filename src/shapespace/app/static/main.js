@@ -81,9 +81,10 @@ element("theme").addEventListener("click", changeTheme);
 element("help").addEventListener("click", () => showHelp(keys));
 
 showTheme();
-// Numbers and lines are there while the library that draws the surface still loads.
+// Numbers and lines are there while the library that draws the surface still loads, and so is a map with its colours.
 const first = new Promise((done) => {
-  session.on("overview", done);
+  session.on("overview", () => session.overview.map || done());
+  session.on("painted", done);
   session.on("trouble", () => session.trouble && done());
 });
 const opening = session.open();

@@ -59,6 +59,8 @@ export const session = new (class extends EventTarget {
     if (this.mode || (view.get("mode") && place !== view.get("place") && this.state)) this.stopMode();
     view.set({ place });
     await this.attempt("", async () => {
+      // A shape that must be computed is asked for at once, and its numbers are there before it.
+      if (hasShape(this.overview, place)) recall("shape", { store, place }).catch(() => {});
       const state = await recall("state", { store, place });
       if (number !== this.asked) return;
       const settled = state.fields || state.missing ? state : { ...state, fields: this.state?.fields, isComing: true };
@@ -140,6 +142,13 @@ export const session = new (class extends EventTarget {
   }
 })();
 
+/** Whether a place of a map has a state, whose shape the store does not hold. */
+function hasShape({ map }, place) {
+  if (!map) return false;
+  const [state, i, j] = place.split(",").map(Number);
+  return map.outcomes[(state * map.y.values.length + j) * map.x.values.length + i] === 1;
+}
+
 /** The place of a point of a map; in a file, of the nearest one that has its shape there. */
 export function placeOf(map, state, i, j) {
   const [across, up] = isFile ? map.strides : [1, 1];
@@ -147,20 +156,20 @@ export function placeOf(map, state, i, j) {
   return [state, near(i, across, map.x.values.length), near(j, up, map.y.values.length)].join(",");
 }
 
-/** The state to show first: the end of a run, the first label of a branch, the middle of a map. */
+/** The state to show first: the end of a run, the first label of a branch, the middle of a map of the chosen state. */
 function firstPlace(overview) {
   if (overview.map) {
     const { x, y, outcomes } = overview.map;
     const [nx, ny] = [x.values.length, y.values.length];
-    const found = [];
+    const layer = Math.min(Number(view.get("state")) || 0, overview.map.states.length - 1);
+    let [nearest, at] = [Infinity, [0, 0]];
     for (let j = 0; j < ny; j++) {
       for (let i = 0; i < nx; i++) {
-        if (outcomes[j * nx + i] === 1) found.push([Math.hypot(i - nx / 2, j - ny / 2), i, j]);
+        const distance = (i - nx / 2) ** 2 + (j - ny / 2) ** 2;
+        if (distance < nearest && outcomes[(layer * ny + j) * nx + i] === 1) [nearest, at] = [distance, [i, j]];
       }
     }
-    if (!found.length) return "0,0,0";
-    const [, i, j] = found.reduce((best, one) => (one[0] < best[0] ? one : best));
-    return placeOf(overview.map, 0, i, j);
+    return placeOf(overview.map, layer, ...at);
   }
   const { places, labels } = overview.table;
   if (overview.noun === "run") return places.at(-1) ?? "";
