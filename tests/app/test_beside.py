@@ -49,6 +49,9 @@ def test_a_page_of_this_machine_frames_it(browser: Browser, stores: Stores, tmp_
         while not any("api/state" in one for one in browser.requests) and time.monotonic() < until:
             browser.run("new Promise((done) => setTimeout(done, 50))")
         server.shutdown()
+    # Before its server ends, so that nothing is still being loaded.
+    browser.send("Page.navigate", url="about:blank")
+    browser.wait("location.href === 'about:blank'")
     beside.stop()
     assert not browser.errors
     assert any("api/state" in one for one in browser.requests)
