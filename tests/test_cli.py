@@ -99,6 +99,15 @@ def test_json_is_the_last_line_with_numbers_only_where_there_are_some(shell: She
     assert len(RunStore.open(record["store"])) == STEPS + 1
 
 
+def test_a_state_coarser_than_asked_for_is_warned_of(shell: Shell, fake: type[FakeSimulation]):
+    fake.observables = {"discretisation_error": 1.3e-3}
+    answer = shell(*RUN, "-s", "mesh_tolerance=1e-3")
+    assert answer.status == 0
+    assert "discretisation_error = 0.0013 at the end: exceeds mesh_tolerance = 0.001" in answer.err
+    assert "-s mesh_tolerance=0.0001" in answer.err
+    assert "exceeds" not in shell(*RUN, "-s", "mesh_tolerance=2e-3").err
+
+
 def test_run_of_a_file(shell: Shell):
     Path("mine.toml").write_text(template("guided-division").replace('"guided-division"', '"mine"'))
     answer = shell("run", "mine.toml", "--dt", "0.1", "--json")

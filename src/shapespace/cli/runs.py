@@ -124,6 +124,8 @@ def run_command(
         tell(f"interrupted; to continue: {shlex.join(words)}")
         return INTERRUPTED
     print(json.dumps(_record(result), allow_nan=False)) if as_json else _summarise(result)
+    if result.warning:
+        tell(result.warning)
     if result.outcome.is_success:
         return 0
     tell(f"the solver gave up ({result.outcome}): {result.outcome.advice} The partial run is in {result.store}.")

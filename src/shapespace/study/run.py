@@ -53,6 +53,17 @@ class Run(Plotted):
             return make_dataset(self.scenario, self.frames, self.outcome)
         return open_dataset(self.store)
 
+    @property
+    def warning(self) -> str | None:
+        """One line where the last state is not as finely resolved as was asked for."""
+        error, asked = self.observables.get("discretisation_error", 0.0), self.scenario.numerics.mesh_tolerance
+        if error <= asked:
+            return None
+        return (
+            f"discretisation_error = {error:.3g} at the end: exceeds mesh_tolerance = {asked:g}, and thin parts such as a neck may be "
+            f"far from right; run it anew with -s mesh_tolerance={asked / 10.0:g} or more elements."
+        )
+
     def summary(self) -> Summary:
         """Scenario, outcome, time, observables, and the last state's outline."""
         from shapespace.study.dataset import meridian_of
@@ -63,6 +74,7 @@ class Run(Plotted):
             "steps": f"{self.steps}, {self.wall_time:.1f} s",
             "store": str(self.store or "in memory"),
         }
+        facts |= {"warning": self.warning} if self.warning else {}
         tables = {"observables at the end": quantities_table(self.scenario.scales, self.observables)}
         return Summary(f"Run of {self.scenario.name}", facts, tables, meridian_of(self.scenario, self.state().frame))
 

@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from shapespace.base.errors import InputError
 from shapespace.view import style
+from shapespace.view.panels import scale_logarithmically
 
 LINES = {
     "energy_rate": ("dF/dt", style.INK, "-"),
@@ -52,7 +53,9 @@ def _plot_run(dataset: xr.Dataset) -> Figure:
         rows[1].plot(time, dataset[name], color=colour, linestyle=line, label=words)
     rows[1].axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=1)
     if heat[-1] < _QUIET * np.nanmax(heat):
-        rows[1].set_yscale("symlog", linthresh=_QUIET * np.nanmax(heat), linscale=0.5)
+        # Whole powers, so that ticks and the linear part around zero keep apart.
+        linear = float(10.0 ** np.floor(np.log10(_QUIET * np.nanmax(heat))))
+        rows[1].set_yscale("symlog", linthresh=linear, linscale=1.0)
     rows[1].set_ylabel(f"power ({style.units_of(dataset['dissipation'])})")
     rows[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="into heat, supply (dashed)")
     rest = np.abs(dataset["energy_residual"].values)
@@ -81,7 +84,9 @@ def _scale_time(axes: Axes, dataset: xr.Dataset) -> None:
     share = np.concatenate([[0.0], np.cumsum(0.5 * (heat[1:] + heat[:-1]) * np.diff(time))])
     half = float(np.interp(0.5 * share[-1], share, time))
     if time[0] == 0.0 and 0.0 < half < _EARLY * time[-1]:
-        axes.set_xscale("symlog", linthresh=half / 10.0, linscale=0.6)
+        early = float(10.0 ** np.floor(np.log10(half / 10.0)))
+        scale_logarithmically(axes, early, float(time[-1]))
+        axes.set_xlim(0.0, time[-1])
 
 
 def _plot_state(dataset: xr.Dataset) -> Figure:
@@ -98,6 +103,8 @@ def _plot_state(dataset: xr.Dataset) -> Figure:
     axes.margins(x=0.25)
     for bar, name in zip(bars, names, strict=True):
         bar.set_alpha(0.45 if name in LINES and LINES[name][2] == "--" else 1.0)
+    if values[-1] >= abs(float(dataset["dissipation"][0])):
+        axes.set_title("at equilibrium: these powers are round-off", fontsize="medium")
     axes.set_yticks(range(len(names)), words)
     axes.invert_yaxis()
     axes.set_xlabel(f"power ({style.units_of(dataset['dissipation'])})")

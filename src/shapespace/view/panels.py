@@ -51,12 +51,17 @@ def _scale_time(axes: Axes, run: Run, values: Array) -> None:
     """Logarithmic time, linear near 0, where most of the change takes up too small a part of a linear axis."""
     early = early_time(run, values)
     if early > 0:
-        axes.set_xscale("symlog", linthresh=early, linscale=0.6)
-        inches = axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
-        room = max(2, int(inches / 0.65))  # for tick labels
-        first, last = (int(np.floor(np.log10(t) + 1e-9)) for t in (early, run.time[-1]))
-        powers = range(last, first - 1, -max(1, int(np.ceil((last - first + 1) / room))))
-        axes.xaxis.set_major_locator(FixedLocator([0.0, *(10.0**p for p in powers)]))
+        scale_logarithmically(axes, early, run.time[-1])
+
+
+def scale_logarithmically(axes: Axes, early: float, late: float) -> None:
+    """A logarithmic axis of time up to `late`, linear from 0 to `early`, with as many ticks as there is room for."""
+    axes.set_xscale("symlog", linthresh=early, linscale=0.6)
+    inches = axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
+    room = max(2, int(inches / 0.65))  # for tick labels
+    first, last = (int(np.floor(np.log10(t) + 1e-9)) for t in (early, late))
+    powers = range(last, first - 1, -max(1, int(np.ceil((last - first + 1) / room))))
+    axes.xaxis.set_major_locator(FixedLocator([0.0, *(10.0**p for p in powers)]))
 
 
 def early_time(run: Run, values: Array) -> float:
