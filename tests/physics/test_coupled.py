@@ -81,6 +81,27 @@ def test_the_matrix_of_the_active_surface_is_its_terms():
     np.testing.assert_allclose(coupling, ActiveTension(5.0, 0.4).power(site), rtol=1e-12)
 
 
+def test_the_rate_of_the_reaction_is_an_observable():
+    """Delta mu int r_p dA is the power of the couplings and what the reaction turns into heat, Lambda Delta mu^2 A."""
+
+    @linear_laws(tension="divergence", reaction_rate="potential")
+    def fuelled(concentration, e11, x1, mobility, reference_concentration):
+        share = concentration / reference_concentration
+        return [[e11, x1 * share], [-x1 * share, mobility]]
+
+    values = {"e11": 1.0, "x1": 2.0, "mobility": 0.7, "potential": 3.0}
+    parameters = {key: Parameter(key, key, UNITS[key], value) for key, value in values.items()}
+    define_model("fuelled", "closed-surface", [fuelled], parameters)
+    define_scenario(
+        "fuelled", "A gel", "fuelled", "polar-swimmer", peclet=0.0, seed_amplitude=0.3, until=2e-3, elements=20, dt=1e-3
+    )
+    data = ss.run(ss.scenario("fuelled", bending_rigidity=1.3, sphere_radius=1.2)).dataset.isel(time=-1)
+    coupling = float(data.chemical_power)
+    heat = 0.7 * 3.0**2 * float(data.area)
+    assert abs(coupling) > 0.1
+    assert float(data.reaction_rate) * 3.0 == pytest.approx(coupling + heat, rel=1e-6)
+
+
 def test_laws_that_are_no_laws_are_named():
     with pytest.raises(ValueError, match="none of them is a motion"):
         linear_laws(rate="potential")

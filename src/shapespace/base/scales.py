@@ -122,6 +122,7 @@ QUANTITIES: dict[str, Quantity] = {
     "force_power": Quantity("P_f", "power of external forces", _POWER),
     "boundary_power": Quantity("P_b", "power of what drives the ends, such as a reservoir", _POWER),
     "chemical_power": Quantity("P_chem", "power of the active tension", _POWER),
+    "reaction_rate": Quantity("R_p", "rate of the reaction, of the whole surface", _RATE),
     "energy_residual": Quantity("R_E", "rest of the energy law", _POWER),
     "amount": Quantity("M", "total amount of the stress regulator", Dimension(2, 0, 0, 1)),
     "amount_supply": Quantity("dM/dt", "exchange of regulator with the surroundings", Dimension(2, 0, -1, 1)),

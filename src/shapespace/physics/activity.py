@@ -12,7 +12,7 @@ from shapespace.geometry.curve import Geometry, area_element, total_curvature
 from shapespace.geometry.motion import coordinate_flow, divergence
 from shapespace.physics.onsager import LinearLaws, reaction_laws
 from shapespace.physics.tension import tension_power
-from shapespace.physics.term import AbstractTerm, Ledger, Site
+from shapespace.physics.term import AbstractReacting, AbstractTerm, Ledger, Site
 
 
 class ActiveTension(AbstractTerm):
@@ -115,7 +115,7 @@ class ReactionDissipation(AbstractReactionTerm):
         return laws.rayleigh(jnp.stack([dilation, rate]))
 
 
-class ReactionSupply(AbstractReactionTerm):
+class ReactionSupply(AbstractReactionTerm, AbstractReacting):
     """-r_p Delta mu: the chemical energy that the reaction takes up (Eq. dtFequi)."""
 
     ledger: ClassVar[Ledger] = Ledger.CHEMICAL
@@ -124,3 +124,7 @@ class ReactionSupply(AbstractReactionTerm):
     def density(self, laws: LinearLaws, dilation: Traced, rate: Traced) -> Traced:
         """-r_p Delta mu."""
         return -rate * self.reaction.potential
+
+    def reaction_rate(self, site: Site) -> Traced:
+        """What the supply is the power of."""
+        return -self.power(site) / self.reaction.potential

@@ -20,8 +20,8 @@ from shapespace.physics.term import CHANNELS, Ledger, Site
 SAMPLES = 64
 TOLERANCE = 1e-8
 """Relative, of homogeneity: laws are evaluated to round-off."""
-_DENSITY = Dimension(-2, 1)
 _POWER_DENSITY = Dimension(-2, 1, -1)
+_UNIT_OF = {Ledger.ENERGY: (Dimension(-2, 1), "E/L^2"), Ledger.RATE: (Dimension(-2, 0, -1), "1/(L^2 T)")}
 UNITS = Dimension(1.7, 0.6, 1.3, 2.1)  # type: ignore[arg-type]  # numbers, of which each dimension is a product of powers
 
 
@@ -127,7 +127,7 @@ def _finite(law: Law, arguments: Mapping[str, Array], constants: Mapping[str, fl
 
 
 def _check_motion(law: Law, arguments: Mapping[str, Array], constants: Mapping[str, float], value: Array) -> None:
-    if law.ledger is Ledger.ENERGY:
+    if law.ledger in (Ledger.ENERGY, Ledger.RATE):
         return
     degree = 2 if law.ledger in CHANNELS else 1
     faster = {name: (-3.0 if LOCAL_QUANTITIES[name].is_motion else 1.0) * given for name, given in arguments.items()}
@@ -149,9 +149,8 @@ def _check_unit(
     """In other units the law must give the same density: its number changes as its dimension says."""
     in_other = {name: given * _unit(LOCAL_QUANTITIES[name].dimension) for name, given in arguments.items()}
     scaled = law.function(**in_other, **{name: v * _unit(dimensions[name]) for name, v in constants.items()})
-    wanted = _DENSITY if law.ledger is Ledger.ENERGY else _POWER_DENSITY
+    wanted, unit = _UNIT_OF.get(law.ledger, (_POWER_DENSITY, "E/(L^2 T)"))
     if not np.allclose(scaled, _unit(wanted) * value, rtol=TOLERANCE, atol=TOLERANCE * np.abs(value).max()):
-        unit = "E/L^2" if law.ledger is Ledger.ENERGY else "E/(L^2 T)"
         given = ", ".join(law.constants)
         raise ValueError(
             f"{law.name}: its unit is not {unit}; check its powers of lengths and times, or the units of {given}."

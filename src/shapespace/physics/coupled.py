@@ -16,6 +16,7 @@ from shapespace.base.arrays import Array, Traced
 from shapespace.physics.laws import Law, dissipation, power
 from shapespace.physics.onsager import LinearLaws, Pair
 from shapespace.physics.quantities import LOCAL_QUANTITIES
+from shapespace.physics.term import Ledger
 
 Matrix = Callable[..., Sequence[Sequence[Any]]]
 
@@ -25,9 +26,11 @@ def linear_laws(channel: str = "bulk", source: str = "chemical", **forces: str) 
 
     forces: for each flux its force, a local quantity or a parameter, in the order of the rows. The function's arguments are
     parameters and quantities that are no motion. Where the dissipation is booked says `channel`, where the couplings' power
-    `source`. Reciprocity and the second law are checked where a model is defined, and with the values of every scenario.
+    `source`. A flux `reaction_rate` of an even force, an energy, is a reaction's rate per area [1/(L^2 T)], and becomes an
+    observable. Reciprocity and the second law are checked where a model is defined, and with the values of every scenario.
     """
     pairs = tuple(Pair(flux, force, 1 - 2 * _is_motion(force)) for flux, force in forces.items())
+    reacting = [i for i, pair in enumerate(pairs) if pair.signature > 0 and pair.flux == Ledger.RATE]
     if not any(pair.signature < 0 for pair in pairs):
         raise ValueError(
             f"forces = {list(forces.values())}: none of them is a motion, so that no work is done; add one."
@@ -45,6 +48,10 @@ def linear_laws(channel: str = "bulk", source: str = "chemical", **forces: str) 
         def bilinear(**values: Traced) -> Traced:
             return _form(pairs, function, given, values, 1, -1.0)
 
+        def rate(**values: Traced) -> Traced:
+            row = function(**{name: values[name] for name in given})[reacting[0]]
+            return sum((row[j] * values[pair.force] for j, pair in enumerate(pairs)), start=jnp.zeros(()))
+
         def check(arguments: Mapping[str, Array], constants: Mapping[str, float]) -> None:
             local = {name: np.ravel(arguments[name]) for name in given if name in arguments}
             for i in range(max((len(one) for one in local.values()), default=1)):
@@ -58,6 +65,9 @@ def linear_laws(channel: str = "bulk", source: str = "chemical", **forces: str) 
         if even:
             _name(bilinear, f"{function.__name__}_coupling", (*given, *odd, *even))
             laws.append(power(source)(bilinear))
+        if reacting:
+            _name(rate, f"{function.__name__}_rate", (*given, *odd, *even))
+            laws.append(Law(rate, Ledger.RATE))
         return laws
 
     return decorate

@@ -15,7 +15,15 @@ from shapespace.base.arrays import Array, Traced
 from shapespace.geometry.curve import Geometry, area_element
 from shapespace.geometry.motion import Rates
 from shapespace.physics.quantities import LOCAL_QUANTITIES, local_values
-from shapespace.physics.term import CHANNELS, AbstractEnergy, AbstractTerm, Ledger, Site, energy_power
+from shapespace.physics.term import (
+    CHANNELS,
+    AbstractEnergy,
+    AbstractReacting,
+    AbstractTerm,
+    Ledger,
+    Site,
+    energy_power,
+)
 
 LawFunction = Callable[..., Traced]
 
@@ -56,6 +64,8 @@ class Law:
         values = {name: getattr(parameters, name) for name in self.constants}
         if self.ledger is Ledger.ENERGY:
             return LawEnergy(self.function, self.quantities, values)
+        if self.ledger is Ledger.RATE:
+            return LawRate(self.function, self.quantities, values)
         return _POWERS[self.ledger](self.function, self.quantities, values)
 
 
@@ -90,6 +100,23 @@ class AbstractLawPower(AbstractTerm):
         share = 0.5 if self.ledger in CHANNELS else -1.0
         value = self.function(**local_values(self.quantities, site), **self.constants)
         return share * value * area_element(site.geometry)
+
+
+class LawRate(AbstractReacting):
+    """How fast a reaction goes, per area: what it does to the surface is in other terms."""
+
+    ledger: ClassVar[Ledger] = Ledger.RATE
+    function: LawFunction = eqx.field(static=True)
+    quantities: tuple[str, ...] = eqx.field(static=True)
+    constants: Mapping[str, Traced]
+
+    def power(self, site: Site) -> Traced:
+        """None."""
+        return 0.0 * site.geometry.r
+
+    def reaction_rate(self, site: Site) -> Traced:
+        """The function's value times r h."""
+        return self.function(**local_values(self.quantities, site), **self.constants) * area_element(site.geometry)
 
 
 def _power_class(booked: Ledger) -> type[AbstractLawPower]:

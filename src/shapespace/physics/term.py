@@ -44,6 +44,8 @@ class Ledger(StrEnum):
     EXTERNAL = "external"
     CHEMICAL = "chemical"
     CONSTRAINT = "constraint"
+    RATE = "reaction_rate"
+    """No power: the term only says how fast a reaction goes."""
 
 
 CHANNELS = (Ledger.SHEAR, Ledger.BULK, Ledger.BENDING, Ledger.FRICTION, Ledger.REACTION)
@@ -58,6 +60,14 @@ class AbstractTerm(eqx.Module):
     @abstractmethod
     def power(self, site: Site) -> Traced:
         """Power density times r h [energy/time]: linear in the rates, or quadratic (half the dissipation) if dissipative."""
+
+
+class AbstractReacting(AbstractTerm):
+    """A term that knows how fast the reaction goes that it stands for."""
+
+    @abstractmethod
+    def reaction_rate(self, site: Site) -> Traced:
+        """r_p r h [1/time]."""
 
 
 class AbstractEnergy(AbstractTerm):

@@ -21,7 +21,16 @@ OUTLINE = 6
 DISSIPATIONS = tuple(channel.value for channel in CHANNELS)
 """The channels of the dissipation, of which a model has some."""
 SUPPLIES = ("force_power", "boundary_power", "chemical_power")
-FLOWS = ("dissipation", *DISSIPATIONS, "external_power", *SUPPLIES, "energy_rate", "energy_residual", "amount_supply")
+FLOWS = (
+    "dissipation",
+    *DISSIPATIONS,
+    "external_power",
+    *SUPPLIES,
+    "energy_rate",
+    "energy_residual",
+    "amount_supply",
+    "reaction_rate",
+)
 """What belongs to the motion of a surface, not to its shape: not known of a state that is given."""
 _SAMPLES_PER_ELEMENT = 4
 _ZOOMS, _ZOOM = 3, 64
@@ -42,6 +51,7 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
         "equator_radius": float(state.field(column["r"], np.array([0.5]))[0]),
         "max_meridional_curvature": peaks["curvature"],
         **{name: integrals[name] for name in ("area", "bending_energy", "energy")},
+        **{name: integrals[name] for name in ("reaction_rate",) if name in integrals},
         **_powers(engine, integrals, first, last),
     }
     if system.storages:

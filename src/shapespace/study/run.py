@@ -60,8 +60,8 @@ class Run(Plotted):
         if error <= asked:
             return None
         return (
-            f"discretisation_error = {error:.3g} at the end: exceeds mesh_tolerance = {asked:g}, and thin parts such as a neck may be "
-            f"far from right; run it anew with -s mesh_tolerance={asked / 10.0:g} or more elements."
+            f"discretisation_error = {error:.3g} at the end: exceeds mesh_tolerance = {asked:g}, and thin parts such as a neck "
+            f"may be far from right; run it anew with -s mesh_tolerance={asked / 10.0:g} or more elements."
         )
 
     def summary(self) -> Summary:

@@ -18,7 +18,7 @@ from shapespace.base.arrays import Array, Traced
 from shapespace.geometry.curve import area_element, meridional_curvature, volume_element
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.force import AxialForce
-from shapespace.physics.term import CHANNELS, AbstractEnergy, AbstractTerm, Ledger, Site, carried_rate
+from shapespace.physics.term import CHANNELS, AbstractEnergy, AbstractReacting, AbstractTerm, Ledger, Site, carried_rate
 from shapespace.variational.rayleighian import booked_power
 from shapespace.variational.surface import SurfaceSystem
 
@@ -46,6 +46,8 @@ def densities(
         "curvature": jnp.abs(meridional_curvature(g)),
     }
     found |= {channel.value: 4.0 * jnp.pi * booked_power(terms, channel, site) for channel in channels(terms)}
+    if reacting := [term for term in terms if isinstance(term, AbstractReacting)]:
+        found["reaction_rate"] = 2.0 * jnp.pi * sum((term.reaction_rate(site) for term in reacting), start=zero)
     if system.species is not None:
         supply = dq[4] + system.field_values(dy)["species_flux"]
         found |= {"amount": element * site.concentration, "amount_supply": 2.0 * jnp.pi * supply}
