@@ -96,6 +96,13 @@ def resumed_branch(
     return found
 
 
+def settled_run(out: Path, scenario: ss.Scenario, quick: bool) -> tuple[ss.Run, ss.Steady]:
+    """A run to its end, in a store where an earlier call may have finished it, and the stationary state next to that end."""
+    case = scenario.with_overrides({"time_tolerance": 10.0 * scenario.run.time_tolerance}) if quick else scenario
+    found = ss.run(case, out=out / "run", resume=True)
+    return found, ss.steady(case, start=found.state())
+
+
 def labelled(branch: ss.Branch, kind: str) -> list[BranchPoint]:
     """The special points of a kind, in the order of the branch."""
     return [point for point in branch.special_points if point.kind == kind]

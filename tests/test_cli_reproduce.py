@@ -49,6 +49,21 @@ def test_what_fails_is_named(shell: Shell):
     assert Path("there/fig_x2/fig_x2.png").exists()
 
 
+@pytest.mark.parametrize(
+    ("word", "names"),
+    [
+        ("5a", ["5abcd"]),
+        ("7", ["7a", "7b"]),
+        ("s1", ["s1"]),
+        ("Fig_7A", ["7a"]),
+        ("5_branch", ["5_branch"]),
+        ("5", ["5abcd"]),
+    ],
+)
+def test_a_figure_goes_by_its_parts(word: str, names: list[str]):
+    assert reproducing._names(word, ["3a", "5_branch", "5abcd", "7a", "7b", "s1"]) == names
+
+
 @pytest.mark.parametrize("arguments", [(), ("9z",), ("x1", "fig_y")])
 def test_unknown_figures_are_refused(shell: Shell, arguments: tuple[str, ...]):
     assert "x1, x2, or all" in one_complaint(shell("reproduce", *arguments))
@@ -57,7 +72,9 @@ def test_unknown_figures_are_refused(shell: Shell, arguments: tuple[str, ...]):
 
 def test_all_experiments_are_known():
     folder = reproducing.experiments_folder()
-    assert {"3a", "5ab", "7b", "s1"} <= {*reproducing.figure_names(folder)}
+    assert {"2", *("3a", "3b", "3c", "3d"), "4", "5abcd", "6", *("7a", "7b", "7c", "7d"), "s1", "s2"} <= {
+        *reproducing.figure_names(folder)
+    }
     assert (folder / "common.py").exists()
 
 

@@ -7,9 +7,10 @@ import pytest
 
 EXPERIMENTS = Path(__file__).resolve().parents[1] / "experiments"
 NAMES = sorted(path.stem for path in EXPERIMENTS.glob("*.py") if path.stem != "common")
-QUICK = [pytest.param(name, marks=pytest.mark.slow) if name == "fig_7c" else name for name in NAMES]
-"""One takes minutes in its quick form too."""
-FULL = [name for name in NAMES if name != "fig_5ab"]
+LONG = ("fig_2", "fig_4", "fig_6", "fig_7a", "fig_7c")
+"""These take long in their quick form too."""
+QUICK = [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in NAMES]
+FULL = [name for name in NAMES if name != "fig_5abcd"]
 """A map of 250,000 states is run by hand."""
 
 

@@ -113,6 +113,7 @@ def division(tmp_path_factory: pytest.TempPathFactory) -> Diagram:
     return diagram(scenario("guided-division", elements=40), *axes, branches=3, out=out, workers=1)
 
 
+@pytest.mark.slow
 def test_all_states_between_two_folds(division: Diagram):
     """Three between the folds that another program finds, one elsewhere; in the order of their bending energy."""
     row = division.dataset.sel(peclet=450.0)

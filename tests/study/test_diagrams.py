@@ -21,6 +21,7 @@ from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.steady import steady
 from shapespace.study.tiles import Done, compute_tile
 from shapespace.study.workers import Workers
+from shapespace.view.diagram import plot_diagram
 
 X, Y = "peclet=18:40:12", "inverse_hydrodynamic_length=0.5:5:10"
 ONSET = 22.0
@@ -118,6 +119,55 @@ def test_another_diagram_is_not_continued(stored: Diagram, changes: dict[str, ob
     assert before == {path: path.stat().st_mtime_ns for path in stored.store.rglob("*")}
 
 
+ACROSS = ("peclet=17.5:40:18", "turnover_rate=7:13:9")
+
+
+@pytest.fixture(scope="module")
+def adaptive(tmp_path_factory: pytest.TempPathFactory) -> Diagram:
+    """Spheres and swimmers again, only where they change in kind."""
+    out = tmp_path_factory.mktemp("diagrams") / "adaptive"
+    return diagram(swimmer(), *ACROSS, states=("trivial", "default"), adaptive=True, out=out, workers=1)
+
+
+def test_an_adaptive_map_is_the_same_at_fewer_points(adaptive: Diagram, tmp_path: Path):
+    """Every point is of the same kind as where all are computed; observables are those of computed points, others have none."""
+    whole = diagram(swimmer(), *ACROSS, states=("trivial", "default"), out=tmp_path / "d", workers=1)
+    one, other = adaptive.dataset, whole.dataset
+    xr.testing.assert_equal(one["regime"], other["regime"])
+    is_inferred = one["outcome"] == CODES[Outcome.INFERRED]
+    exists = other["outcome"] == CODES[Outcome.CONVERGED]
+    assert ((one["outcome"] == CODES[Outcome.CONVERGED]) == exists.where(~is_inferred, False)).all()
+    for name in ("area", "bending_energy", "velocity", "correction"):
+        assert one[name].isnull().where(is_inferred, True).all()
+    for name in ("area", "bending_energy", "length"):
+        assert np.nanmax(np.abs(one[name] / other[name] - 1.0)) < 1e-7, name
+    assert one["area"].notnull().sum() == adaptive.converged
+    computed = {*zip(*np.nonzero(~is_inferred.to_numpy()), strict=True)}
+    assert len(computed) == adaptive.points - adaptive.inferred == adaptive.converged + len(adaptive.failed)
+    assert adaptive.inferred > 0.2 * adaptive.points
+    assert whole.inferred == 0
+
+
+def test_an_adaptive_map_is_continued_the_same(adaptive: Diagram):
+    before = adaptive.dataset.copy(deep=True)
+    told: list[Done] = []
+    arguments = {"states": ("trivial", "default"), "out": adaptive.store, "workers": 1, "resume": True}
+    (lost,) = [one for one in (adaptive.store / "outcome").rglob("*") if one.match("c/0/0/1")]
+    lost.unlink()
+    with pytest.raises(StoreError, match="adaptive is True, not none"):
+        diagram(swimmer(), *ACROSS, **arguments)
+    again = diagram(swimmer(), *ACROSS, adaptive=True, progress=told.append, **arguments)
+    xr.testing.assert_identical(again.dataset, before)
+    assert [one.tile for one in told] == [(1, 0)]
+    assert told[0].inferred == int((before["outcome"].isel(peclet=slice(9, None)) == CODES[Outcome.INFERRED]).sum())
+
+
+def test_an_adaptive_map_draws_its_regimes(adaptive: Diagram):
+    named = [text.get_text() for text in plot_diagram(adaptive).legends[0].get_texts()]
+    assert named == ["symmetric, resting", "symmetric & asymmetric, resting & swimming"]
+    plot_diagram(adaptive, "velocity")
+
+
 def test_no_state_at_all_says_so(tmp_path: Path):
     found = diagram(swimmer(), "peclet=5:10:2", "inverse_hydrodynamic_length=1:2:2", out=tmp_path / "d", workers=1)
     assert found.converged == 0
@@ -166,10 +216,14 @@ def test_workers_give_the_same_map_and_may_be_killed(stored: Diagram, tmp_path: 
 
 
 @pytest.mark.slow
-def test_a_killed_client_leaves_no_process_and_loses_nothing(stored: Diagram, tmp_path: Path):
+@pytest.mark.parametrize("name", ["stored", "adaptive"])
+def test_a_killed_client_leaves_no_process_and_loses_nothing(name: str, request: pytest.FixtureRequest, tmp_path: Path):
+    known: Diagram = request.getfixturevalue(name)
     out = tmp_path / "d"
+    axes = known.request.grid.x, known.request.grid.y
     command = [sys.executable, "-m", "shapespace", "diagram", "polar-swimmer", "-s", "elements=20", "mesh_tolerance=1e-3",
-               "-x", X, "-y", Y, "--state", "trivial,default", "--workers", "2", "--out", str(out)]  # fmt: skip
+               "-x", str(axes[0]), "-y", str(axes[1]), "--state", "trivial,default", "--workers", "2", "--out", str(out),
+               *(["--adaptive"] if known.request.adaptive else [])]  # fmt: skip
     client = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     deadline = time.monotonic() + 240.0
     while not (finished := [path for path in (out / "outcome" / "c").rglob("*") if path.is_file()]):
@@ -186,10 +240,20 @@ def test_a_killed_client_leaves_no_process_and_loses_nothing(stored: Diagram, tm
     missing = DiagramStore.open(out).missing_tiles
     assert len(missing) <= 4 - len(finished)
     times = {path: path.stat().st_mtime_ns for path in finished}
-    found = diagram(swimmer(), X, Y, states=("trivial", "default"), out=out, workers=1, resume=True)
+    found = diagram(
+        swimmer(),
+        *axes,
+        states=("trivial", "default"),
+        adaptive=known.request.adaptive,
+        out=out,
+        workers=1,
+        resume=True,
+    )
     assert times == {path: path.stat().st_mtime_ns for path in finished}
-    for name in stored.dataset.data_vars:
-        np.testing.assert_allclose(found.dataset[name], stored.dataset[name], rtol=1e-9, atol=1e-9, err_msg=str(name))
+    for variable in known.dataset.data_vars:
+        np.testing.assert_allclose(
+            found.dataset[variable], known.dataset[variable], rtol=1e-9, atol=1e-9, err_msg=str(variable)
+        )
 
 
 def test_a_cluster_gives_the_same_map(stored: Diagram, tmp_path: Path):
@@ -247,6 +311,7 @@ def test_bad_axes_are_refused(tmp_path: Path, x: str, part: str):
         ({"states": ()}, "must name different states"),
         ({"states": ("default", "default")}, "must name different states"),
         ({"states": ("upside-down",)}, "upside-down"),
+        ({"adaptive": True, "branches": 2}, "--adaptive and --branches 2"),
     ],
 )
 def test_bad_requests_are_refused(tmp_path: Path, arguments: dict[str, object], part: str):

@@ -110,7 +110,13 @@ def branches_at(point: Point) -> tuple[Array, Array]:
 
 def _branches(point: Point, kernel: Kernel) -> tuple[Array, Array]:
     system = system_of(point)
-    pair = branch_directions(system.form_of(kernel, point.x, point.p)) @ kernel.vectors
+    form = system.form_of(kernel, point.x, point.p)
+    directions = branch_directions(form)
+    if not len(directions):
+        # Both are one, as where curves of pitchforks cross, and round-off left none.
+        sizes, axes = np.linalg.eigh(0.5 * (form + form.T))
+        directions = np.stack(2 * [axes[:, int(np.argmin(np.abs(sizes)))]])
+    pair = directions @ kernel.vectors
     weights = metric(system.base, np.append(system.state(point.x), own_parameter(point)))
     pair = pair / np.sqrt(pair**2 @ weights)[:, None]
     across = int(np.argmin(np.abs(pair[:, -1])))

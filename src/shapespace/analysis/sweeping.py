@@ -2,13 +2,14 @@
 
 A point's guess extrapolates the states already found on the longest straight run of neighbours,
 
-    x_0 = sum_(i <= m) (-1)^(i+1) C(m, i) x_(-i),   m <= 4,
+    x_0 = sum_(i <= m) x_(-i) prod_(j != i) d_j/(d_j - d_i),   m <= 4,
 
-which misses by the m-th difference of x; Newton's method then starts with the factors of the point before. Which points
-are tried in which order depends on the grid and on what exists there, never on time or on other grids.
+d_i the distance of the i-th one, which misses by the m-th difference of x; Newton's method then starts with the factors of
+the point before. Which points are tried in which order depends on the grid and on what exists there, never on time or on
+other grids.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,8 +23,8 @@ from shapespace.numerics.newton import Newton, solve_root
 
 Index = tuple[int, int]
 
-WEIGHTS = ((1.0,), (2.0, -1.0), (3.0, -3.0, 1.0), (4.0, -6.0, 4.0, -1.0))
-"""Of the nearest neighbour, the next one and so on, by their number."""
+LONGEST = 4
+"""Neighbours in a row that are extrapolated."""
 SIDES = ((-1, 0), (1, 0), (0, -1), (0, 1))
 SWEEP_NEWTON = Newton(max_iterations=12, min_damping=0.25)
 """A guess that needs more patience is replaced by shorter steps."""
@@ -48,12 +49,13 @@ class Sweep:
     """The states found so far on a grid. values (n_0, n_1, m): parameters. reasons: why there is none, where one was tried.
 
     is_strict: stay on one sheet of states, up to its folds. others: sweeps whose states are known; where this one comes upon
-    them it ends, at the points `met`.
+    them it ends, at the points `met`. among: the points that are wanted, where not all are.
     """
 
     values: Array
     is_strict: bool = False
     others: Sequence["Sweep"] = ()
+    among: Collection[Index] | None = None
     met: set[Index] = field(default_factory=set)
     found: dict[Index, Stationary] = field(default_factory=dict)
     reasons: dict[Index, Outcome] = field(default_factory=dict)
@@ -69,8 +71,8 @@ class Sweep:
 
     @property
     def missing(self) -> list[Index]:
-        """Points without a state."""
-        return [at for at in np.ndindex(*self.values.shape[:2]) if at not in self.found]
+        """Points that are wanted and have no state."""
+        return [at for at in np.ndindex(*self.values.shape[:2]) if self._is_wanted(at) and at not in self.found]
 
     def begin(self, at: Index, state: Stationary) -> bool:
         """Take a state, stepping from its own parameters to those of a point; False where that fails, or it is known there."""
@@ -105,12 +107,17 @@ class Sweep:
                     grows = True
 
     def _is_worth(self, at: Index) -> bool:
-        """Whether more neighbours are known than when the point was last tried."""
+        """Whether a point is wanted, and more neighbours are known than when it was last tried."""
+        if not self._is_wanted(at):
+            return False
         known = len(self._known(at))
         if known <= self._neighbours.get(at, 0) or self._tries.get(at, 0) >= MAX_TRIES:
             return False
         self._neighbours[at], self._tries[at] = known, self._tries.get(at, 0) + 1
         return True
+
+    def _is_wanted(self, at: Index) -> bool:
+        return self.among is None or at in self.among
 
     def _known(self, at: Index) -> list[Index]:
         """Solved neighbours."""
@@ -134,9 +141,9 @@ class Sweep:
         return None
 
     def _run(self, at: Index, side: Index) -> list[Index]:
-        """Known points in a row from here, the nearest first, as many as there are weights."""
+        """Known points in a row from here, the nearest first."""
         run: list[Index] = []
-        for m in range(1, len(WEIGHTS) + 1):
+        for m in range(1, LONGEST + 1):
             one = (at[0] + m * side[0], at[1] + m * side[1])
             if one not in self.found:
                 break
@@ -146,7 +153,8 @@ class Sweep:
     def _extrapolated(self, at: Index, run: list[Index]) -> Stationary | None:
         problem = self.found[run[0]].problem
         xs = [self._on(problem, one) for one in run]
-        guess = sum((w * x for w, x in zip(WEIGHTS[len(run) - 1], xs, strict=True)), np.zeros_like(xs[0]))
+        distances = np.array([np.abs(self.p(one) - self.p(at)).sum() for one in run])
+        guess = sum((w * x for w, x in zip(_weights(distances), xs, strict=True)), np.zeros_like(xs[0]))
         state = self._newton(problem, guess, self.p(at))
         if state.outcome is not Outcome.CONVERGED:
             self.reasons[at] = state.outcome
@@ -197,6 +205,13 @@ class Sweep:
             assert isinstance(better, AbstractContinuableProblem)
             x, problem = problem.carried(root.x, better), better
         return Stationary(problem, root.x, p, root.outcome, root.correction, np.nan, iterations, move < MAX_MOVES)
+
+
+def _weights(distances: Array) -> Array:
+    """Of values at distances (m,) to one side, in the value at distance 0 of the polynomial through them."""
+    apart = distances - distances[:, None]
+    np.fill_diagonal(apart, distances)
+    return np.asarray((distances / apart).prod(axis=1))
 
 
 def _is_near(state: Stationary, other: Stationary) -> bool:

@@ -28,6 +28,7 @@ class Outcome(StrEnum):
     REJOINED = "rejoined"
     OUT_OF_RANGE = "out-of-range"
     UNFOLDED = "unfolded"
+    INFERRED = "inferred"
     MAX_STARTS = "max-starts"
     COMPLETE = "complete"
     EIGENVALUES_UNCONVERGED = "eigenvalues-unconverged"
@@ -76,6 +77,9 @@ _ADVICE = {
     Outcome.REACHED_STOP: "The branch came to a value where it was to end.",
     Outcome.NOT_REACHED: (
         "Stepping stalled on the way to these parameters: there may be no such state, or a fold lies between; follow the branch."
+    ),
+    Outcome.INFERRED: (
+        "Not computed: the points known around it are all of one kind, which it was given; map without --adaptive for its values."
     ),
     Outcome.NO_STATE: ("No state of this name was found at these parameters: choose others, or another --state."),
     Outcome.BRANCH_STALLED: (

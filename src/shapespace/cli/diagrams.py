@@ -38,6 +38,7 @@ AXIS = "KEY=FROM:TO:COUNT"
         "shapespace diagram polar-swimmer -x peclet=25:300:40 -y inverse_hydrodynamic_length=0.1:10:40",
         "shapespace diagram guided-division -x ring_amplitude=0:4:20 -y peclet=200:450:20 --stability --workers 1",
         "shapespace diagram polar-swimmer -x peclet=15:60:30 -y turnover_rate=5:15:30 --state trivial,default --boundaries",
+        "shapespace diagram guided-division -x turnover_rate=30:45:40 -y peclet=300:450:40 --stability --adaptive",
         "shapespace plot results/polar-swimmer-diagram --observable regime",
         "shapespace plot results/polar-swimmer-diagram --observable velocity",
     ),
@@ -62,6 +63,12 @@ def diagram_command(
         tuple[str, ...],
         Parameter(name="--from", metavar="STORE[:LABEL]", help="With --branches: stored states to start from as well."),
     ] = (),
+    adaptive: Annotated[
+        bool,
+        Parameter(
+            help="Compute only where the kind of the states changes; points between get the kind of those around."
+        ),
+    ] = False,
     stability: Annotated[bool, Parameter(help="Store the number of growing modes of each state too.")] = False,
     boundaries: Annotated[
         bool, Parameter(help="Follow the folds and branch points that bound regions; drawn over the map by `plot`.")
@@ -94,7 +101,7 @@ def diagram_command(
             rate = _Rate(display, path)
             found = diagram(
                 chosen, x, y, out=path, states=state.split(","), stability=stability, boundaries=boundaries,
-                branches=branches, origins=origins,
+                branches=branches, origins=origins, adaptive=adaptive,
                 workers=workers, dask=dask, resume=resume,
                 ready=rate.begin, progress=rate.update, curve_progress=rate.follow,
             )  # fmt: skip
@@ -121,7 +128,7 @@ class _Rate:
     def __init__(self, display: ProgressDisplay, path: Path) -> None:
         self._display, self._path = display, path
         self._done, self._total, self._began = 0, 0, monotonic()
-        self.computed = 0
+        self._points = self.computed = 0
 
     def begin(self, done: int, total: int) -> None:
         """Take note of what is there already."""
@@ -135,9 +142,10 @@ class _Rate:
 
     def update(self, tile: "Done") -> None:
         """Take note of a tile."""
-        self.computed += tile.points
-        done = self._done + self.computed
-        rate = self.computed / max(monotonic() - self._began, 1e-9)
+        self._points += tile.points
+        self.computed += tile.points - tile.inferred
+        done = self._done + self._points
+        rate = self._points / max(monotonic() - self._began, 1e-9)
         text = f"{done} of {self._total} points, {rate:.1f} a second, {(self._total - done) / rate:.0f} s left"
         self._display.update(text, done / self._total)
 
@@ -153,6 +161,7 @@ def _record(found: "Diagram", computed: int, seconds: float) -> dict[str, Any]:
         "points": found.points,
         "computed": computed,
         "converged": found.converged,
+        "inferred": found.inferred,
         "seconds": seconds,
         "points_per_second": computed / seconds,
         "boundaries": [_boundary(one) for one in found.boundaries],
@@ -177,9 +186,11 @@ def _boundary(found: "Curve") -> dict[str, Any]:
 def _summarise(found: "Diagram", computed: int, seconds: float) -> None:
     from collections import Counter
 
-    ends = ", ".join(f"{count} {name}" for name, count in Counter(one["outcome"] for one in found.failed).most_common())
+    counts = Counter(one["outcome"] for one in found.failed).most_common()
+    counts += [("inferred from those around", found.inferred)] if found.request.adaptive else []
+    ends = "".join(f", {count} {name}" for name, count in counts)
     print_lines(
-        f"{found.points} points: {found.converged} converged{', ' if ends else ''}{ends}",
+        f"{found.points} points: {found.converged} converged{ends}",
         f"computed {computed} in {seconds:.1f} s, {computed / seconds:.1f} a second",
         *(f"bounded by {one.of}s: {one.store}" for one in found.boundaries),
         *([f"{len(found.unexplained)} changes between neighbours lie on no such curve"] if found.unexplained else []),

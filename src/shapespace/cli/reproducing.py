@@ -1,7 +1,9 @@
 """The command `reproduce`: figures of the paper from the experiments, with a table of what it says and what we get."""
 
 import json
+import re
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from time import monotonic
@@ -29,8 +31,21 @@ def experiments_folder() -> Path:
 
 
 def figure_names(folder: Path) -> list[str]:
-    """Of all figures, as the command takes them: 3a, 5ab and so on."""
+    """Of all figures, as the command takes them: 3a, 5abcd and so on."""
     return sorted(path.stem.removeprefix(PREFIX) for path in folder.glob(f"{PREFIX}*.py"))
+
+
+def _names(word: str, known: Sequence[str]) -> list[str]:
+    """Those of a figure or of some of its parts: 5a is part of 5abcd, 7 is 7a, 7b and so on."""
+    word = word.lower().removeprefix(PREFIX)
+    asked = re.fullmatch(r"(s?\d+)([a-z]*)", word)
+    parts = [(name, match) for name in known if (match := re.fullmatch(r"(s?\d+)([a-z]*)", name))]
+    found = [name for name, match in parts if asked and match[1] == asked[1] and {*asked[2]} <= {*match[2]}]
+    if word in known:
+        return [word]
+    if not found:
+        raise InputError(f"{word}: is no figure; choose some of {', '.join(known)}, or all.")
+    return found
 
 
 @app.command(
@@ -40,7 +55,7 @@ def figure_names(folder: Path) -> list[str]:
     )
 )
 def reproduce(
-    *figures: Annotated[str, Parameter(metavar="FIG", help="Names such as 3a or 7b, or all.")],
+    *figures: Annotated[str, Parameter(metavar="FIG", help="Names such as 3a, 7 for all of 7a to 7d, or all.")],
     quick: Annotated[
         bool, Parameter(help="Coarse and in seconds to minutes: leave out what takes long, above all growth rates.")
     ] = False,
@@ -57,10 +72,7 @@ def reproduce(
     known = figure_names(folder)
     if not figures:
         raise InputError(f"reproduce: needs figures; give some of {', '.join(known)}, or all.")
-    wanted = known if ALL in figures else [name.lower().removeprefix(PREFIX) for name in dict.fromkeys(figures)]
-    for name in wanted:
-        if name not in known:
-            raise InputError(f"{name}: is no figure; choose some of {', '.join(known)}, or all.")
+    wanted = known if ALL in figures else [*dict.fromkeys(name for one in figures for name in _names(one, known))]
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
     records = [_reproduced(name, out, quick, as_json) for name in wanted]

@@ -21,7 +21,16 @@ from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.study.curve_store import Curve, outline
 from shapespace.study.curves import curve_through
-from shapespace.study.diagram_store import BOUNDARIES, CODES, CURVES, OUTCOME, REGIME, UNSTABLE, Diagram, DiagramStore
+from shapespace.study.diagram_store import (
+    BOUNDARIES,
+    CURVES,
+    OUTCOME,
+    REGIME,
+    UNSTABLE,
+    Diagram,
+    DiagramStore,
+    kind_codes,
+)
 from shapespace.study.files import storage, write_atomically
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.regimes import SHAPE
@@ -35,7 +44,6 @@ SAME = 1e-3
 """A point this near to a known curve, in cells, is one of it."""
 MAX_FAILURES = 12
 """Changes tried in vain, the farthest from each other first, after which those that remain are given up."""
-PHYSICAL_ENDS = [CODES[one] for one in (Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING)]
 
 Progress = Callable[[Curve], None]
 """Called after each curve."""
@@ -117,13 +125,8 @@ def kinds(diagram: Diagram) -> NDArray[np.int64]:
         array = data[name].to_numpy()
         return np.asarray(array.reshape(-1, *array.shape[-2:]).swapaxes(1, 2))
 
-    code = values(REGIME).astype(np.int64) & ~int(SHAPE)
-    if UNSTABLE in data:
-        code += 256 * (1 + np.nan_to_num(values(UNSTABLE), nan=-1.0).astype(np.int64))
-    outcome = values(OUTCOME)
-    code[outcome != CODES[Outcome.CONVERGED]] = 0
-    code[np.isin(outcome, PHYSICAL_ENDS)] = -1
-    return code
+    unstable = values(UNSTABLE) if UNSTABLE in data else None
+    return kind_codes(values(OUTCOME), values(REGIME), unstable, but=int(SHAPE))
 
 
 def find_changes(diagram: Diagram) -> list[Change]:

@@ -45,10 +45,12 @@ _OUTCOMES = (
     Outcome.NECK_CLOSED,
     Outcome.SELF_INTERSECTING,
     Outcome.BRANCH_STALLED,
+    Outcome.INFERRED,
 )
 CODES = {outcome: code for code, outcome in enumerate(_OUTCOMES, start=1)}
 """Numbers of outcomes in stores, which stay; 0 is a point that is not computed yet. Names are stored beside them."""
 NOT_COMPUTED = 0
+PHYSICAL_ENDS = [CODES[one] for one in (Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING)]
 CURVES, BOUNDARIES = "curves", "boundaries.json"
 """Beside the Zarr store: a folder of curves, and what is known of changes of the map that lie on none."""
 ABOUT_SOLUTION = {
@@ -56,6 +58,21 @@ ABOUT_SOLUTION = {
     "iterations": "Newton iterations",
     "elements": "collocation elements",
 }
+
+
+def kind_codes(outcome: Array, regime: Array, unstable: Array | None = None, but: int = 0) -> NDArray[np.int64]:
+    """A number for what kind each state is of, from what is stored; 0 is none, -1 a surface that touches itself.
+
+    unstable: numbers of growing modes. but: flags that make no difference.
+    """
+    code = regime.astype(np.int64) & ~but
+    if unstable is not None:
+        code += 256 * (1 + np.nan_to_num(unstable, nan=-1.0).astype(np.int64))
+    # What is inferred has a regime where it is inferred that there is a state.
+    is_state = (outcome == CODES[Outcome.CONVERGED]) | ((outcome == CODES[Outcome.INFERRED]) & (regime > 0))
+    code[~is_state] = 0
+    code[np.isin(outcome, PHYSICAL_ENDS)] = -1
+    return code
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +93,7 @@ class DiagramRequest:
     """What is asked for besides the scenario.
 
     states: names. branches: with more than none, up to so many states at each point, on all sheets that folds connect with those
-    named and those of the stores `origins`.
+    named and those of the stores `origins`. adaptive: only at the points of a quad-tree.
     """
 
     grid: Grid
@@ -84,6 +101,7 @@ class DiagramRequest:
     stability: bool
     branches: int = 0
     origins: tuple[str, ...] = ()
+    adaptive: bool = False
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -94,13 +112,14 @@ class DiagramRequest:
         """Plain values."""
         axes = {name: asdict(axis) for name, axis in (("x", self.grid.x), ("y", self.grid.y))}
         more = {"branches": self.branches, "origins": [*self.origins]} if self.branches else {}
+        more |= {"adaptive": True} if self.adaptive else {}
         return {**axes, "states": [*self.states], "stability": self.stability, **more}
 
     @classmethod
     def from_dict(cls, stored: Mapping[str, Any]) -> Self:
         """What `as_dict` described."""
         grid = Grid(Axis(**stored["x"]), Axis(**stored["y"]))
-        more = stored.get("branches", 0), tuple(stored.get("origins", ()))
+        more = stored.get("branches", 0), tuple(stored.get("origins", ())), stored.get("adaptive", False)
         return cls(grid, tuple(stored["states"]), stored["stability"], *more)
 
 
@@ -151,10 +170,10 @@ class DiagramStore(AbstractRecordStore[Anchors]):
         manifest = cls._read_manifest(path)
         stored, wanted = manifest.get(cls.noun), request.as_dict()
         difference = cls._scenario_of(path, manifest).difference(scenario)
-        for name, value in wanted.items():
-            kept = stored.get(name) if isinstance(stored, dict) else None
-            if kept != value:
-                difference = difference or f"{name} is {_short(kept)}, not {_short(value)}"
+        kept = stored if isinstance(stored, dict) else {}
+        for name in dict.fromkeys((*wanted, *kept)):
+            if kept.get(name) != wanted.get(name):
+                difference = difference or f"{name} is {_short(kept.get(name))}, not {_short(wanted.get(name))}"
         if difference:
             raise StoreError(
                 f"{path}: holds a diagram whose {difference}; resume with the same value or choose another --out."
@@ -277,6 +296,8 @@ class DiagramStore(AbstractRecordStore[Anchors]):
 
 
 def _short(value: Any) -> str:
+    if value is None:
+        return "none"
     return str(Axis(**value)) if isinstance(value, dict) else str(value)
 
 
@@ -301,7 +322,8 @@ class Diagram(Plotted):
         facts = {
             "axes": ", ".join(str(axis) for axis in (self.request.grid.x, self.request.grid.y)),
             "states": ", ".join(self.request.states),
-            "points": f"{self.points}, {self.converged} with a state, {len(self.failed)} without",
+            "points": f"{self.points}, {self.converged} with a state, {len(self.failed)} without"
+            + (f", {self.inferred} inferred" if self.request.adaptive else ""),
             "store": str(self.store),
         }
         return Summary(f"Diagram of {self.scenario.name}", facts, is_drawn=self.converged > 0)
@@ -313,9 +335,14 @@ class Diagram(Plotted):
 
     @property
     def converged(self) -> int:
-        """Of these, those with a state."""
+        """Of these, those with a state that was computed."""
         is_state = self.dataset[OUTCOME] == CODES[Outcome.CONVERGED]
         return int((is_state.any("state") if self.request.branches > 1 else is_state).sum())
+
+    @property
+    def inferred(self) -> int:
+        """Of these, those that an adaptive map was spared: they have a kind and no values."""
+        return int((self.dataset[OUTCOME] == CODES[Outcome.INFERRED]).sum())
 
     @property
     def regimes(self) -> NDArray[np.int64]:
@@ -345,7 +372,7 @@ class Diagram(Plotted):
         (x, y), data = self.request.grid.keys, self.dataset
         codes = data[OUTCOME].transpose(..., y, x).to_numpy().reshape(-1, *self.request.grid.shape[::-1])
         names = {code: outcome for outcome, code in CODES.items()}
-        is_failed = (codes != NOT_COMPUTED) & (codes != CODES[Outcome.CONVERGED])
+        is_failed = ~np.isin(codes, (NOT_COMPUTED, CODES[Outcome.CONVERGED], CODES[Outcome.INFERRED]))
         if self.request.branches:
             is_failed[1:] = False
             is_failed[0] &= ~(codes == CODES[Outcome.CONVERGED]).any(axis=0)

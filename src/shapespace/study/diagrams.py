@@ -45,6 +45,7 @@ def diagram(
     boundaries: bool = False,
     branches: int = 0,
     origins: Sequence[str | Path] = (),
+    adaptive: bool = False,
     workers: int | None = None,
     dask: str | None = None,
     resume: bool = False,
@@ -57,13 +58,15 @@ def diagram(
     states: names of states, as of `steady`; each is followed from where it is found first. stability: store the number of
     growing modes too. boundaries: follow the folds and branch points that bound its regions, also of a diagram that is
     complete; they come with `Diagram.boundaries`. branches: up to so many states at each point, in the order of their bending
-    energy: all that folds connect with those named, and with those of the stores `origins` (`STORE` or `STORE:LABEL`). workers:
-    processes, by default one for each core; dask: address of a scheduler whose workers compute instead; the map does not depend
-    on them. `out` is the directory of the store, new or empty; with `resume` a store there is continued. ready: told how many
-    points are done of how many. InputError before anything is computed; where a process cannot be kept alive, WorkerError.
+    energy: all that folds connect with those named, and with those of the stores `origins` (`STORE` or `STORE:LABEL`).
+    adaptive: compute only where the kind of the states changes, and give other points the kind of those around, with outcome
+    `inferred` and without values. workers: processes, by default one for each core; dask: address of a scheduler whose
+    workers compute instead; the map does not depend on them. `out` is the directory of the store, new or empty; with `resume`
+    a store there is continued. ready: told how many points are done of how many. InputError before anything is computed;
+    where a process cannot be kept alive, WorkerError.
     """
     grid = Grid(*(Axis.read(one, flag) if isinstance(one, str) else one for flag, one in (("-x", x), ("-y", y))))
-    request = make_request(scenario, grid, states, stability, branches, origins)
+    request = make_request(scenario, grid, states, stability, branches, origins, adaptive)
     engine = _engine(workers, dask)
     begin = DiagramStore.resume if resume and holds_store(out) else DiagramStore.create
     with engine, begin(out, scenario, request, observable_names(scenario, grid.keys)) as store:
@@ -90,6 +93,7 @@ def make_request(
     stability: bool,
     branches: int = 0,
     origins: Sequence[str | Path] = (),
+    adaptive: bool = False,
 ) -> DiagramRequest:
     """What is asked for, checked: InputError where it cannot be had."""
     names = tuple(str(read_state_name(name, scenario.kind)) for name in states)
@@ -101,12 +105,14 @@ def make_request(
         )
     if origins and not branches:
         raise InputError(f"--from {origins[0]}: adds states to those of --branches N; give that too.")
+    if adaptive and branches:
+        raise InputError(f"--adaptive and --branches {branches}: adaptive maps follow named states; give only one.")
     for origin in origins:
         find_starts(origin, scenario)
     for corner in grid.corners(scenario):
         check_has_isolated_states(corner)
     KeyedProblem.of(scenario, grid.keys)
-    return DiagramRequest(grid, names, stability, branches, tuple(map(str, origins)))
+    return DiagramRequest(grid, names, stability, branches, tuple(map(str, origins)), adaptive)
 
 
 def _lay_anchors(store: DiagramStore) -> None:

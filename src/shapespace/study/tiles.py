@@ -1,6 +1,6 @@
 """The points of one tile of a diagram, from the states in the middle of the tiles around: what a worker computes."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter
@@ -20,16 +20,19 @@ from shapespace.study.diagram_store import (
     ABOUT_SOLUTION,
     CODES,
     COUNT,
+    NOT_COMPUTED,
     OUTCOME,
     REGIME,
     UNSTABLE,
     Anchors,
     Diagram,
     DiagramStore,
+    kind_codes,
 )
 from shapespace.study.engine import Engine
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.observables import measure, shape_end
+from shapespace.study.quadtree import Lines, QuadTree
 from shapespace.study.regimes import regime_of
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
@@ -41,11 +44,12 @@ Tile = tuple[int, int]
 
 
 class Done(NamedTuple):
-    """A finished tile: its points, those of them with a state, and the seconds it took."""
+    """A finished tile: its points, those of them with a state, those that were only inferred, and the seconds it took."""
 
     tile: Tile
     points: int
     converged: int
+    inferred: int
     seconds: float
 
 
@@ -53,26 +57,100 @@ def compute_tile(path: str | Path, tile: Tile) -> Done:
     """Compute a tile of a stored diagram and write it there. What it holds depends on the store's anchors alone."""
     start = perf_counter()
     store = DiagramStore.open(path)
-    values = _all_sheets(store, tile) if store.request.branches else _named(store, tile)
+    request = store.request
+    compute = _all_sheets if request.branches else _adaptively if request.adaptive else _named
+    values = compute(store, tile)
     store.write_tile(tile, values)
     is_state = values[OUTCOME] == CODES[Outcome.CONVERGED]
-    if store.request.branches:  # however many states a point has, it counts once
+    inferred = int((values[OUTCOME] == CODES[Outcome.INFERRED]).sum())
+    if request.branches:  # however many states a point has, it counts once
         is_state = is_state.any(axis=0)
-    return Done(tile, is_state.size, int(is_state.sum()), perf_counter() - start)
+    return Done(tile, is_state.size, int(is_state.sum()), inferred, perf_counter() - start)
 
 
 def _named(store: DiagramStore, tile: Tile) -> dict[str, Array]:
     """Arrays (states, n_x, n_y) of a tile's points: each state by its name."""
     surveyor = Surveyor(store.scenario, store.request.grid.keys, store.request.stability)
-    number, surveys = store.request.grid.tiles.index(tile), []
+    surveys = []
     for anchors in store:
         sweep = _sweep(store, surveyor, anchors, tile)
-        own = anchors.outcomes[number]
-        untried = own if own is not Outcome.CONVERGED else Outcome.NOT_REACHED
-        shape = sweep.values.shape[:2]
         found = {at: [state] for at, state in sweep.found.items()}
-        surveys.append(surveyor.survey(shape, found, sweep.reasons, untried))
+        surveys.append(surveyor.survey(sweep.values.shape[:2], found, sweep.reasons, _untried(store, anchors, tile)))
     return {name: np.concatenate([one[name] for one in surveys]) for name in surveys[0]}
+
+
+def _untried(store: DiagramStore, anchors: Anchors, tile: Tile) -> Outcome:
+    """Why there is no state where none was tried."""
+    own = anchors.outcomes[store.request.grid.tiles.index(tile)]
+    return own if own is not Outcome.CONVERGED else Outcome.NOT_REACHED
+
+
+def _adaptively(store: DiagramStore, tile: Tile) -> dict[str, Array]:
+    """As `_named`, but only the points of a quad-tree; others are given the kind of those around, as inferred."""
+    surveyor = Surveyor(store.scenario, store.request.grid.keys, store.request.stability)
+    followers = [_Follower(store, surveyor, anchors, tile) for anchors in store]
+    x, y = store.request.grid.span(tile)
+    shape = x.stop - x.start, y.stop - y.start
+    out = surveyor.empty(len(followers), shape)
+    tree, known, before = QuadTree(shape), np.zeros(shape, bool), -1
+    seen: dict[int, list[Index]] = {}
+    while known.sum() > before:
+        before = int(known.sum())
+        for level, lines in enumerate(tree.levels):
+            kinds = kind_codes(out[OUTCOME], out[REGIME], out.get(UNSTABLE))
+            wanted = tree.refine(level, kinds, known)
+            if wanted == seen.get(level):
+                continue
+            seen[level] = wanted
+            for slot, follower in enumerate(followers):
+                follower.extend(lines, wanted)
+                follower.record(out, slot, [(int(lines[0][i]), int(lines[1][j])) for i, j in wanted])
+            known |= out[OUTCOME][0] != NOT_COMPUTED
+    kinds = kind_codes(out[OUTCOME], out[REGIME], out.get(UNSTABLE))
+    for at, like in tree.inferred(kinds, known):
+        out[OUTCOME][(slice(None), *at)] = CODES[Outcome.INFERRED]
+        for name in {REGIME, UNSTABLE} & out.keys():
+            out[name][(slice(None), *at)] = out[name][(slice(None), *like)]
+    return out
+
+
+class _Follower:
+    """One state at points of a tile, lattice by lattice."""
+
+    def __init__(self, store: DiagramStore, surveyor: "Surveyor", anchors: Anchors, tile: Tile) -> None:
+        self._store, self._surveyor, self._anchors, self._tile = store, surveyor, anchors, tile
+        self._found: dict[Index, Stationary] = {}
+        self._reasons: dict[Index, Outcome] = {}
+        self._recorded: set[Index] = set()
+        self._near: Spectrum | None = None
+        self._untried = _untried(store, anchors, tile)
+
+    def extend(self, lines: Lines, wanted: Collection[Index]) -> None:
+        """Look for the state at the wanted points of a lattice, from where it is known already, at first from the anchors."""
+        places = [{int(one): number for number, one in enumerate(line)} for line in lines]
+        known = {
+            (places[0][i], places[1][j]): state
+            for (i, j), state in self._found.items()
+            if i in places[0] and j in places[1]
+        }
+        if known.keys() >= {*wanted}:
+            return
+        sweep = _sweep(self._store, self._surveyor, self._anchors, self._tile, lines, known, {*wanted})
+        for (i, j), state in sweep.found.items():
+            self._found[int(lines[0][i]), int(lines[1][j])] = state
+        for (i, j), reason in sweep.reasons.items():
+            self._reasons[int(lines[0][i]), int(lines[1][j])] = reason
+
+    def record(self, out: dict[str, Array], slot: int, points: Iterable[Index]) -> None:
+        """Put what is known at points into the arrays."""
+        for at in points:
+            state = self._found.get(at)
+            if state is None:
+                out[OUTCOME][(slot, *at)] = CODES[self._reasons.get(at, self._untried)]
+            elif at not in self._recorded:
+                self._recorded.add(at)
+                measured = self._surveyor.measured(state)
+                self._near = self._surveyor.record(out, (slot, *at), state, measured, self._near)
 
 
 def _all_sheets(store: DiagramStore, tile: Tile) -> dict[str, Array]:
@@ -109,10 +187,25 @@ def _sheets(store: DiagramStore, surveyor: "Surveyor", tile: Tile) -> list[Sweep
     return spread_sheets(values, starts())
 
 
-def _sweep(store: DiagramStore, surveyor: "Surveyor", anchors: Anchors, tile: Tile) -> Sweep:
-    """The states at a tile's points."""
+def _sweep(
+    store: DiagramStore,
+    surveyor: "Surveyor",
+    anchors: Anchors,
+    tile: Tile,
+    lines: Lines | None = None,
+    known: Mapping[Index, Stationary] | None = None,
+    among: Collection[Index] | None = None,
+) -> Sweep:
+    """The states at a tile's points, or at some of a lattice in it where some are known."""
     grid = store.request.grid
-    sweep = Sweep(grid.values(*grid.span(tile)))
+    span = grid.span(tile)
+    numbers = [np.arange(one.start, one.stop) for one in span]
+    if lines is not None:
+        numbers = [own[line] for own, line in zip(numbers, lines, strict=True)]
+    sweep = Sweep(grid.values(*numbers), found=dict(known or {}), among=among)
+    if known:
+        sweep.spread(min(known))
+        return sweep
     tiles = {one: number for number, one in enumerate(grid.tiles)}
     for near in _around(tile):
         if near not in tiles or not sweep.missing:
@@ -121,9 +214,8 @@ def _sweep(store: DiagramStore, surveyor: "Surveyor", anchors: Anchors, tile: Ti
         if anchors.outcomes[number] is not Outcome.CONVERGED:
             continue
         i, j = grid.x.anchors[near[0]], grid.y.anchors[near[1]]
-        x, y = grid.span(tile)
-        place = np.array([i - x.start, j - y.start])
-        at = min(sweep.missing, key=lambda one: (np.abs(np.array(one) - place).sum(), one))
+        apart = np.abs(numbers[0] - i)[:, None] + np.abs(numbers[1] - j)
+        at = min(sweep.missing, key=lambda one: (apart[one], one))
         state = surveyor.state(anchors.meshes[number], anchors.xs[number], grid.values(i, j).reshape(2))
         if sweep.begin(at, state):
             sweep.spread(at)
@@ -196,18 +288,23 @@ class Surveyor:
 
         reasons: why there is none, where one was tried; `untried` where none was.
         """
-        names = [*self.names, *ABOUT_SOLUTION, *([UNSTABLE] if self.stability else [])]
-        out: dict[str, Array] = {name: np.full((slots, *shape), np.nan) for name in names}
-        out[OUTCOME], out[REGIME] = np.zeros((slots, *shape), np.int8), np.zeros((slots, *shape), np.uint8)
+        out = self.empty(slots, shape)
         near: list[Spectrum | None] = [None] * slots
         for at in np.ndindex(*shape):
             out[OUTCOME][(slice(None), *at)] = CODES[reasons.get(at, untried)]
-            states = [(self._measured(state), state) for state in found.get(at, ())]
+            states = [(self.measured(state), state) for state in found.get(at, ())]
             for slot, (measured, state) in enumerate(sorted(states, key=lambda one: one[0]["bending_energy"])[:slots]):
-                near[slot] = self._record(out, (slot, *at), state, measured, near[slot])
+                near[slot] = self.record(out, (slot, *at), state, measured, near[slot])
         return out
 
-    def _record(
+    def empty(self, slots: int, shape: tuple[int, ...]) -> dict[str, Array]:
+        """Arrays (slots, n_x, n_y) by name in which nothing is computed."""
+        names = [*self.names, *ABOUT_SOLUTION, *([UNSTABLE] if self.stability else [])]
+        out: dict[str, Array] = {name: np.full((slots, *shape), np.nan) for name in names}
+        out[OUTCOME], out[REGIME] = np.zeros((slots, *shape), np.int8), np.zeros((slots, *shape), np.uint8)
+        return out
+
+    def record(
         self,
         out: dict[str, Array],
         at: tuple[int, ...],
@@ -239,10 +336,10 @@ class Surveyor:
         there = diagram.dataset.isel(
             {x: at[0], y: at[1], **({"state": number} if "state" in diagram.dataset.dims else {})}
         )
-        mine = self._in_units(state, self._measured(state))
+        mine = self._in_units(state, self.measured(state))
         return all(abs(mine[name] - float(there[name])) <= TELLING * abs(mine[name]) for name in ("area", "length"))
 
-    def _measured(self, state: Stationary) -> dict[str, float]:
+    def measured(self, state: Stationary) -> dict[str, float]:
         """Dimensionless observables."""
         assert isinstance(state.problem, KeyedProblem)
         problem = state.problem.base

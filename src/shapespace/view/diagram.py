@@ -26,16 +26,16 @@ MOST_COUNTED = 8
 
 
 def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
-    """One map for each state, side by side in one scale; hatched where there is none, white where nothing is computed yet.
+    """One map for each state, side by side in one scale; hatched where there is none, white where nothing is computed.
 
-    The observable is the most telling one that applies where none is given; `regime` is one map of all states together.
-    Boundaries are drawn over it where they were followed.
+    The observable is the most telling one that applies where none is given; `regime` is one map of all states together, and the
+    choice for adaptive maps, which have observables at some points only. Boundaries are drawn over it where they were followed.
     """
-    if observable == REGIME:
+    if observable == REGIME or (observable is None and diagram.request.adaptive):
         return plot_regimes(diagram)
     data, (x, y) = diagram.dataset, diagram.request.grid.keys
     names = [str(name) for name in data.data_vars if name not in (OUTCOME, *ABOUT_SOLUTION)]
-    is_state = data[OUTCOME] == CODES[Outcome.CONVERGED]
+    is_state = data[OUTCOME].isin([CODES[Outcome.CONVERGED], CODES[Outcome.INFERRED]])
     name = observable or _telling(diagram, data.where(is_state))
     if name not in names:
         raise InputError(f"{name}: is no observable of this diagram; choose one of {', '.join(names)}.")
@@ -127,7 +127,7 @@ def _scale(name: str, values: np.ndarray) -> tuple[Normalize, object]:
 
 
 def _mark_missing(axes: Axes, x: np.ndarray, y: np.ndarray, codes: np.ndarray) -> None:
-    failed = (codes != NOT_COMPUTED) & (codes != CODES[Outcome.CONVERGED])
+    failed = ~np.isin(codes, (NOT_COMPUTED, CODES[Outcome.CONVERGED], CODES[Outcome.INFERRED]))
     if not failed.any():
         return
     axes.pcolor(x, y, np.ma.masked_where(~failed, codes), hatch=HATCH, facecolor="none", edgecolor=style.FAINT, lw=0.0)
