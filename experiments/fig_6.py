@@ -35,7 +35,8 @@ def run(out: Path, quick: bool) -> list[Row]:
             abs(radius[0] - 1.0) < 1e-6 and 0.0 < value < 0.01),
         Row("it is below 0.02 at t", "0.2", f"{late:.3f}", "", 0.1 < late < 0.3),
         Row("meridional curvature at the neck", "about 300", f"{curvature:.0f}", "", 200.0 < curvature < 800.0),
-        Row("the neck", "stays open, at rest", str(found.outcome), "", found.outcome in (ss.Outcome.STATIONARY, ss.Outcome.REACHED_END)),
+        Row("the neck", "stays open, at rest", str(found.outcome), "",
+            found.outcome in (ss.Outcome.STATIONARY, ss.Outcome.REACHED_END)),
         near("its radius in the end (second column: found directly)", f"{known:.7g}", value, known, 1e-5),
     ]  # fmt: skip
 
