@@ -203,7 +203,9 @@ def test_energy_law_closes_with_random_combinations(seed: int):
     chosen = [*rng.permutation([*ALL])[: rng.integers(2, 5)], *rng.permutation([*paper])[: rng.integers(2, 6)]]
     keys = {key: (ALL | paper)[key] * rng.uniform(0.3, 1.2) for key in chosen}
     engine = make_engine("rich", azimuthal_flow=True, peclet=60.0 * rng.uniform(), seed_amplitude=0.3, **keys)
-    check_order([energy_miss(engine, 2, steps, 0.02) for steps in (10, 20, 40)], 2, margin=0.35)
+    # At one moment alone what is left over may just pass zero.
+    misses = [max(energy_miss(engine, 2, steps, until) for until in (0.01, 0.02)) for steps in (10, 20, 40)]
+    check_order(misses, 2, margin=0.35)
 
 
 def test_volume_and_area_that_are_held_elastically():
