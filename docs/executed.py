@@ -11,7 +11,6 @@ import os
 import re
 import shlex
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -81,12 +80,12 @@ def _run_line(words: list[str], place: str) -> None:
 
 
 def _serve(command: list[str], place: str) -> None:
-    """Start what serves until it is interrupted; it must print its address."""
+    """Start what serves until it is ended; it must print its address."""
     log, deadline = Path("served.txt"), time.monotonic() + _SERVER_SECONDS
     with log.open("w") as file, subprocess.Popen(command, stdout=file, stderr=file) as server:
         while "http://127.0.0.1" not in log.read_text() and server.poll() is None and time.monotonic() < deadline:
             time.sleep(0.1)
-        server.send_signal(signal.SIGINT)
+        server.terminate()
     if "http://127.0.0.1" not in log.read_text():
         raise RuntimeError(f"{place}: {shlex.join(command)} printed no address: {log.read_text()}")
 

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 import shapespace as ss
 from shapespace.base.errors import InputError
 from shapespace.view.notebook import Animation, outline_svg
+from shapespace.view.show import film_of
 
 
 class Balanced(HTMLParser):
@@ -75,6 +77,23 @@ def test_a_branch_shows_its_diagram_and_special_points(stores: Path):
     assert "0, 1" in text
     assert 'src="data:image/png;base64,' in branch._repr_html_()
     assert branch.plot("pressure").axes[0].get_ylabel().startswith("pressure")
+
+
+def test_a_film_of_a_branch_goes_along_its_key_or_along_its_arc(stores: Path):
+    branch = ss.open_branch(stores / "branch")
+    film = film_of(stores / "branch")
+    values = {point.parameter: point.observables["pressure"] for point in branch.points}
+    np.testing.assert_array_equal(film["time"], sorted(values))
+    np.testing.assert_array_equal(film["pressure"], [values[one] for one in sorted(values)])
+    assert film["time"].attrs["words"] == "peclet"
+    # The middle one is where the branch turns.
+    points = branch.points[:3]
+    turned = replace(
+        branch, points=tuple(replace(one, parameter=at) for one, at in zip(points, (1.0, 2.0, 1.5), strict=True))
+    )
+    film = film_of(turned)
+    np.testing.assert_array_equal(film["time"], [point.place for point in points])
+    assert film["time"].attrs["words"] == "arclength"
 
 
 def test_states_and_failures_show_what_they_are():

@@ -43,7 +43,7 @@ def _dataset_of(source: Source) -> xr.Dataset:
     return open_dataset(source) if isinstance(source, str | Path) else source.dataset
 
 
-def _film_of(source: Source | Branch) -> xr.Dataset:
+def film_of(source: Source | Branch) -> xr.Dataset:
     """What a movie shows: a run over time, or the states along a branch, where the key takes the place of time.
 
     Where the branch turns, so that a value of the key comes twice, its arclength does.
@@ -116,4 +116,4 @@ def plot(
 
 def movie(source: Source | Branch, out: str | Path, progress: Callable[[int, int], None] | None = None) -> Path:
     """Write the movie of a run, or of the states along a branch, as .mp4, or .gif without ffmpeg; returns the path written."""
-    return save_movie(_film_of(source), Path(out), progress)
+    return save_movie(film_of(source), Path(out), progress)
