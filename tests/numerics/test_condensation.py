@@ -8,6 +8,7 @@ import pytest
 from shapespace.base.arrays import Array
 from shapespace.numerics.condensation import Factors, determinant_sign, factorise, solve
 from shapespace.numerics.gauss import gauss_rule
+from shapespace.numerics.transposed import solve_transposed
 
 
 class Size(NamedTuple):
@@ -165,6 +166,22 @@ def test_pivots_that_vanish_on_single_elements(size: Size, left: float):
     largest = np.abs(system.points[..., :m, :m]).min(axis=(0, 1)).argmax(axis=1)
     system.points[element, :, np.arange(m), largest] *= left
     check_against_dense(system)
+
+
+@pytest.mark.parametrize("size", SIZES, ids=str)
+@pytest.mark.parametrize(("filled", "left"), [(1.0, 1.0), (0.4, 1.0), (1.0, 1e-9)])
+def test_transposed_solves(size: Size, filled: float, left: float):
+    """b . J^-1 a = a . J^-T b, also where elements are eliminated on their own."""
+    system = random_system(size, 7, filled)
+    m, element = size.n + size.n_a, size.elements // 2
+    largest = np.abs(system.points[..., :m, :m]).min(axis=(0, 1)).argmax(axis=1)
+    system.points[element, :, np.arange(m), largest] *= left
+    factors, rng, rows = factors_of(system), np.random.default_rng(0), len(dense_matrix(system))
+    for a, b in rng.standard_normal((3, 2, rows)):
+        copy, direct, adjoint = b.copy(), solve(factors, a), solve_transposed(factors, b)
+        np.testing.assert_array_equal(copy, b)
+        scale = np.abs(direct).max() * np.abs(b).sum() + np.abs(adjoint).max() * np.abs(a).sum()
+        assert abs(b @ direct - a @ adjoint) < 1e-10 * scale
 
 
 def test_two_right_hand_sides_through_one_factorisation():

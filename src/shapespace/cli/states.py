@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     help_epilogue=examples(
         "shapespace steady polar-swimmer",
         "shapespace steady guided-division -s ring_amplitude=2.5 --json",
+        "shapespace steady guided-division --sensitivity peclet,ring_amplitude",
         "shapespace steady guided-division --from results/guided-division --out results/divided",
     ),
 )
@@ -49,6 +50,10 @@ def steady_command(
             help="default; trivial: resting sphere or flat disc; prolate, oblate, stomatocyte: vesicles.",
         ),
     ] = None,
+    sensitivity: Annotated[
+        str,
+        Parameter(metavar="KEYS", help="Derivatives of all observables by these parameters, with commas between them."),
+    ] = "",
     out: Annotated[Path | None, Parameter(metavar="DIR", help="New directory to store the state in.")] = None,
     as_json: AsJson = False,
 ) -> int:
@@ -66,17 +71,20 @@ def steady_command(
         with storage(out):
             RunStore.check_free(out)
     found = steady(chosen, state=state or "default", start=start)
-    rates = None
+    rates, slopes = None, dict[str, dict[str, float]]()
     if found.outcome.is_success:
+        keys = [key.strip() for key in sensitivity.split(",")] if sensitivity else []
+        slopes = found.sensitivity((), keys) if keys else {}
         spectrum = found.spectrum()
         rates = Rates.of(spectrum, found.scenario)
         if out is not None:
             store_frame(out, chosen, found.frame, found.outcome)
             store_modes(out, found.modes(spectrum))
     if as_json:
-        print(json.dumps(_record(found, rates, out), allow_nan=False))
+        record = _record(found, rates, out) | ({"sensitivities": slopes} if slopes else {})
+        print(json.dumps(record, allow_nan=False))
     else:
-        _summarise(found, rates, out)
+        _summarise(found, rates, slopes, out)
     if not found.outcome.is_success:
         tell(f"no stationary state found ({found.outcome}): {found.outcome.advice} Reached: {found.nearest}")
         return GAVE_UP
@@ -101,7 +109,7 @@ def _record(found: "Steady", rates: "Rates | None", out: Path | None) -> dict[st
     return record | ({"store": str(out)} if out is not None and rates else {})
 
 
-def _summarise(found: "Steady", rates: "Rates | None", out: Path | None) -> None:
+def _summarise(found: "Steady", rates: "Rates | None", slopes: dict[str, dict[str, float]], out: Path | None) -> None:
     from rich.table import Table
 
     from shapespace.study.modes import neutral_modes
@@ -116,6 +124,13 @@ def _summarise(found: "Steady", rates: "Rates | None", out: Path | None) -> None
             kind = ", ".join(word for word in (rates.parities[i], names.get(i)) if word)
             table.add_row(f"{real:.8g}", f"{imaginary:.8g}" if imaginary else "", f"{rates.errors[i]:.1g}", kind)
         print_lines("", table, *held, _verdict(rates))
+    if slopes:
+        by_key = Table(
+            "derivative of", *(f"by {key}" for key in next(iter(slopes.values()))), box=None, header_style="bold"
+        )
+        for name, row in slopes.items():
+            by_key.add_row(name, *(f"{value:.8g}" for value in row.values()))
+        print_lines("", by_key, "")
     print_lines(f"{found.outcome}: {found.outcome.advice}")
     if out is not None and rates is not None:
         print_lines(f"stored in {out}")

@@ -18,9 +18,13 @@ from shapespace.numerics.pointwise import Density, Functions, compiled_functions
 from shapespace.numerics.small_lu import compiled, read_only
 from shapespace.numerics.state import State
 from shapespace.numerics.system import AbstractSystem
+from shapespace.numerics.transposed import solve_transposed
 
 RELATIVE_FLOOR = 1.0
 """Fields and scalars smaller than this are measured absolutely in norms; problems are dimensionless and of order one."""
+
+Slopes = tuple[Array, Array]
+"""Derivatives by x (size,) and by p (n_p,)."""
 
 REST = Rate(0.0, np.zeros(0))
 """dq/dt = 0, whatever q."""
@@ -84,6 +88,10 @@ class CollocationLinearisation(AbstractLinearisation):
     def solve(self, residual: Array) -> Array:
         """J dx = residual."""
         return condensation.solve(self.factors, residual)
+
+    def solve_transposed(self, x: Array) -> Array:
+        """The multipliers y of the rows, flat as the residual, with J^T y = x."""
+        return solve_transposed(self.factors, x)
 
 
 @dataclass(frozen=True)
@@ -237,6 +245,30 @@ class CollocationProblem(AbstractSmoothProblem):
         values = {name: joined([part[name] for part in parts], self._points) for name in parts[0]}
         sums = {name: float(self._shares @ value) for name, value in values.items()}
         return sums, {name: float(value.max()) for name, value in values.items()}
+
+    def integral_slopes(self, density: Density, x: Array, p: Array) -> tuple[dict[str, Slopes], dict[str, Slopes]]:
+        """Derivatives by x and p of what `integrals` returns, at rest; a largest value stays that of its point."""
+        tiles = self._tiles(x, p)
+        parts = [self.functions.density_slopes(density, tile) for tile in tiles]
+        values = [self.functions.densities(density, tile) for tile in tiles]
+        sums, peaks = dict[str, Slopes](), dict[str, Slopes]()
+        for name in parts[0]:
+            slopes = [joined(list(by), self._points) for by in zip(*(part[name] for part in parts), strict=True)]
+            largest = np.zeros(self._points)
+            largest[int(joined([value[name] for value in values], self._points).argmax())] = 1.0
+            sums[name], peaks[name] = self._gathered(slopes, self._shares), self._gathered(slopes, largest)
+        return sums, peaks
+
+    def _gathered(self, slopes: Sequence[Array], shares: Array) -> Slopes:
+        """Derivatives of a sum over points with these shares, from those by rows, scalars and p (., k N)."""
+        rows, scalars, p = slopes[0] * shares, slopes[1] @ shares, slopes[2] @ shares
+        n, k = self.n, self.degree
+        rows = rows.reshape(-1, k, self.elements).transpose(2, 1, 0)
+        slope, algebraic, field = rows[..., :n], rows[..., n : self.n_rows], rows[..., self.n_rows :]
+        nodes = np.zeros((self.elements + 1, n))
+        nodes[:-1] = field.sum(axis=1)
+        inside = slope + self._widths[:, None, None] * np.einsum("jl,ejn->eln", gauss_rule(k).matrix, field)
+        return self.pack(State(self.mesh, nodes, inside, algebraic, scalars)), p
 
     def rates(self, x: Array, p: Array, rate: Rate) -> Array:
         """dq/dt at the Gauss points, (N, k, n_q)."""

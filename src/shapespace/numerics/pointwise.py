@@ -58,6 +58,14 @@ class Tile(NamedTuple):
     p: Traced
 
 
+class DensitySlopes(NamedTuple):
+    """Derivatives of a density at each point: by the rows (2n + n_a, T), the scalars (n_s, T) and the parameters (n_p, T)."""
+
+    rows: Traced
+    scalars: Traced
+    p: Traced
+
+
 class Values(NamedTuple):
     """rows (m + n_i, T): equations, then integrands; ends (n_b,): end conditions; targets (n_i,)."""
 
@@ -189,6 +197,20 @@ def _densities(system: AbstractSystem, density: Density, packed: Traced) -> dict
     return jax.vmap(at, in_axes=-1)(tile.rows, tile.history)
 
 
+def _density_slopes(system: AbstractSystem, density: Density, packed: Traced) -> dict[str, DensitySlopes]:
+    """Derivatives of named densities at rest."""
+    tile = _opened(system, packed)
+    dq = jnp.zeros(numbers(system).stored)
+
+    def at(v: Traced, s: Traced, p: Traced) -> dict[str, Traced]:
+        dy, a, y = _split_row(system, v)
+        return density(system, dy, y, a, s, dq, p)
+
+    slopes = jax.vmap(jax.jacrev(at, argnums=(0, 1, 2)), in_axes=(-1, None, None), out_axes=-1)
+    found = slopes(tile.rows, tile.scalars, tile.p)
+    return {name: DensitySlopes(*one) for name, one in found.items()}
+
+
 class Functions(NamedTuple):
     """The functions above, compiled for one system; they compile again for each of the TILES.
 
@@ -201,6 +223,7 @@ class Functions(NamedTuple):
     derivative: Callable[..., Traced]
     second_derivative: Callable[..., Traced]
     densities: Callable[..., dict[str, Traced]]
+    density_slopes: Callable[..., dict[str, DensitySlopes]]
 
 
 _NAMES: dict[AbstractSystem, str] = {}
@@ -224,10 +247,11 @@ def compiled_functions(system: AbstractSystem) -> Functions:
         return jax.jit(of_arrays) if name is None else Kept(of_arrays, f"{name} {function.__name__}")
 
     @cache
-    def densities(density: Density) -> Callable[..., Any]:
-        of_arrays = partial(_densities, system, density)
+    def of_density(function: Callable[..., Any], density: Density) -> Callable[..., Any]:
+        of_arrays = partial(function, system, density)
         is_own = name is not None and density.__module__.startswith(f"{__package__.partition('.')[0]}.")
-        return Kept(of_arrays, f"{name} {density.__module__} {density.__qualname__}") if is_own else jax.jit(of_arrays)
+        what = f"{name} {function.__name__} {density.__module__} {density.__qualname__}"
+        return Kept(of_arrays, what) if is_own else jax.jit(of_arrays)
 
     return Functions(
         values=compiled(_values),
@@ -235,5 +259,6 @@ def compiled_functions(system: AbstractSystem) -> Functions:
         stored=compiled(_stored),
         derivative=compiled(_first_derivative),
         second_derivative=compiled(_second_derivative),
-        densities=lambda density, tile: densities(density)(tile),
+        densities=lambda density, tile: of_density(_densities, density)(tile),
+        density_slopes=lambda density, tile: of_density(_density_slopes, density)(tile),
     )

@@ -105,3 +105,27 @@ def backward(lu, size, x):  # type: ignore[no-untyped-def]  # numba finds the ty
         for j in range(i + 1, x.shape[0]):
             total += row[j] * x[j]
         x[i] = (x[i] - total) / row[i]
+
+
+@compiled
+def forward_transposed(lu, pivot, x):  # type: ignore[no-untyped-def]  # numba finds the types
+    """Apply the transpose of `forward` to one column in place."""
+    columns = pivot.shape[0]
+    for i in range(lu.shape[0] - 1, 0, -1):
+        row = lu[i]
+        for j in range(min(i, columns)):
+            x[j] -= row[j] * x[i]
+    for j in range(columns - 1, -1, -1):
+        p = pivot[j]
+        if p != j:
+            x[j], x[p] = x[p], x[j]
+
+
+@compiled
+def backward_transposed(lu, size, x):  # type: ignore[no-untyped-def]  # numba finds the types
+    """Apply the transpose of `backward` to one column in place: what lies beyond `size` takes its share."""
+    for i in range(size):
+        row = lu[i]
+        x[i] /= row[i]
+        for j in range(i + 1, x.shape[0]):
+            x[j] -= row[j] * x[i]

@@ -7,6 +7,7 @@ Every dimensionless parameter is a product of powers of the keys (the scales are
 so that derivatives along a key are exact, also where one key moves many parameters.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -59,21 +60,26 @@ def _power(q: Array, exponents: Array) -> Array:
 
 def make_powers(scenario: Scenario, keys: tuple[str, ...]) -> Powers:
     """How the dimensionless parameters depend on the keys. InputError for a key that is no real physical parameter."""
+    return powers_of(scenario, keys, lambda one: Engine.of(one).p)
+
+
+def powers_of(scenario: Scenario, keys: tuple[str, ...], of: Callable[[Scenario], Array]) -> Powers:
+    """How numbers of a scenario (n,) that are products of powers of the keys depend on these; InputError as above."""
     known = {**scenario.parameters.model_dump(), **scenario.twins()}
     for key in keys:
         if key not in known:
             raise InputError(f"{key}: is not a parameter of this model; choose one of {', '.join(known)}.")
+
+    def at(values: Array) -> Array:
+        return of(scenario.with_overrides(dict(zip(keys, values.tolist(), strict=True))))
+
     # At values that every key may have: a reduced volume is less than one.
-    base = _parameters(scenario, keys, np.full(len(keys), 0.5))
-    halved = [_parameters(scenario, keys, 0.5 - 0.25 * np.eye(len(keys))[k]) for k in range(len(keys))]
+    base = at(np.full(len(keys), 0.5))
+    halved = [at(0.5 - 0.25 * np.eye(len(keys))[k]) for k in range(len(keys))]
     ratios = np.stack([np.where(base == 0.0, 1.0, base / np.where(base == 0.0, 1.0, p)) for p in halved], axis=1)
     # Exponents are multiples of 1/6: of areas, volumes and their roots.
     exponents = np.round(6.0 * np.log2(ratios)) / 6.0
     return Powers(base * 2.0 ** exponents.sum(axis=1), exponents)
-
-
-def _parameters(scenario: Scenario, keys: tuple[str, ...], values: Array) -> Array:
-    return Engine.of(scenario.with_overrides(dict(zip(keys, values.tolist(), strict=True)))).p
 
 
 @dataclass(frozen=True)

@@ -52,15 +52,16 @@ def make_observable(scenario: Scenario, name: str, key: str) -> Observable:
     return Observable(name, unit)
 
 
-def _unknowns(base: CollocationProblem) -> State:
+def blank_row(base: CollocationProblem) -> State:
+    """A gradient to fill in: zero, laid out as a state."""
     return base.unpack(
         np.zeros((base.elements + 1) * base.n + base.elements * base.degree * base.n_rows + len(base.system.scalars))
     )
 
 
-def _at(base: CollocationProblem, x: Array, field: str, u: float) -> Linear:
+def value_at(base: CollocationProblem, x: Array, field: str, u: float) -> Linear:
     """A differential field at u."""
-    state, gradient, column = base.unpack(x), _unknowns(base), base.system.fields.index(field)
+    state, gradient, column = base.unpack(x), blank_row(base), base.system.fields.index(field)
     if u == 1.0:
         gradient.nodes[-1, column] = 1.0
         return float(state.nodes[-1, column]), base.pack(gradient)
@@ -71,9 +72,9 @@ def _at(base: CollocationProblem, x: Array, field: str, u: float) -> Linear:
     return float(row @ x), row
 
 
-def _slope(base: CollocationProblem, x: Array, field: str, u: float) -> Linear:
+def slope_at(base: CollocationProblem, x: Array, field: str, u: float) -> Linear:
     """The derivative of a differential field at u."""
-    state, gradient = base.unpack(x), _unknowns(base)
+    state, gradient = base.unpack(x), blank_row(base)
     element, share = state.place(u)
     gradient.slopes[element, :, base.system.fields.index(field)] = state.rule.basis(np.array([share]))[0]
     row = base.pack(gradient)
@@ -91,31 +92,31 @@ def _scalar(name: str) -> Callable[[CollocationProblem, Array], Linear]:
 
 
 def _height(base: CollocationProblem, x: Array) -> Linear:
-    (first, one), (last, other) = (_at(base, x, "z", u) for u in (0.0, 1.0))
+    (first, one), (last, other) = (value_at(base, x, "z", u) for u in (0.0, 1.0))
     return first - last, one - other
 
 
 def _neck(base: CollocationProblem, x: Array) -> Linear:
     """r where it is smallest, so that moving the place changes nothing to first order."""
     found = neck(base.unpack(x), base.system.fields.index("r"))
-    return (float("nan"), np.zeros_like(x)) if found is None else (found[1], _at(base, x, "r", found[0])[1])
+    return (float("nan"), np.zeros_like(x)) if found is None else (found[1], value_at(base, x, "r", found[0])[1])
 
 
 def _largest_concentration(base: CollocationProblem, x: Array) -> Linear:
     place, value = largest_value(base.unpack(x), base.system.fields.index("c"))
-    return value, _at(base, x, "c", place)[1]
+    return value, value_at(base, x, "c", place)[1]
 
 
 def _polarity(base: CollocationProblem, x: Array) -> Linear:
     """1 - psi'(0)/psi'(1)."""
-    (first, one), (last, other) = (_slope(base, x, "psi", u) for u in (0.0, 1.0))
+    (first, one), (last, other) = (slope_at(base, x, "psi", u) for u in (0.0, 1.0))
     return 1.0 - first / last, (first / last * other - one) / last
 
 
 OBSERVED: dict[str, Callable[[CollocationProblem, Array], Linear]] = {
     "height": _height,
     "neck_radius": _neck,
-    "equator_radius": lambda base, x: _at(base, x, "r", 0.5),
+    "equator_radius": lambda base, x: value_at(base, x, "r", 0.5),
     "length": _scalar("h"),
     "pressure": _scalar("p"),
     "velocity": _scalar("v0"),

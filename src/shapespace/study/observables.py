@@ -1,6 +1,8 @@
 """Observables of a state, by their contract names, dimensionless."""
 
-import jax.numpy as jnp
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from shapespace.base.arrays import Array
@@ -13,6 +15,7 @@ from shapespace.numerics.state import State
 from shapespace.physics.term import CHANNELS
 from shapespace.study.engine import Engine
 from shapespace.variational.ledger import boundary_power, densities
+from shapespace.variational.surface import SurfaceSystem
 
 CLOSING_RADIUS = 1e-4
 """A neck thinner than this, in units of the surface's length scale, counts as closed."""
@@ -32,6 +35,8 @@ FLOWS = (
     "reaction_rate",
 )
 """What belongs to the motion of a surface, not to its shape: not known of a state that is given."""
+PEAKS = ("curvature",)
+"""Densities whose largest point value is an observable, not their integral."""
 _SAMPLES_PER_ELEMENT = 4
 _ZOOMS, _ZOOM = 3, 64
 """Each narrows the place of an extremum to two of so many parts; its value then is exact to round-off."""
@@ -41,46 +46,72 @@ def measure(engine: Engine, x: Array, rate: Rate) -> dict[str, float]:
     """All observables of one state in motion that need no other moment; `energy` is F, for the energy law."""
     problem, system = engine.problem, engine.system
     state = problem.unpack(x)
-    column = {name: i for i, name in enumerate(system.fields)}
     integrals, peaks = problem.integrals(densities, x, engine.p, rate)
-    scalars = dict(zip(system.scalars, state.scalars.tolist(), strict=True))
-    first, last = state.nodes[0], state.nodes[-1]
-    out = {
-        "height": first[column["z"]] - last[column["z"]],
-        "length": integrals["length"],
-        "equator_radius": float(state.field(column["r"], np.array([0.5]))[0]),
-        "max_meridional_curvature": peaks["curvature"],
-        **{name: integrals[name] for name in ("area", "bending_energy", "energy")},
-        **{name: integrals[name] for name in ("reaction_rate",) if name in integrals},
-        **_powers(engine, integrals, first, last),
-    }
-    if system.storages:
-        out["energy"] += system.stored_energy(
-            jnp.asarray(engine.p), {"p": integrals["volume"], "sigma": integrals["area"]}
-        )
-    out |= {
+    parts = integrals | {name: peaks[name] for name in PEAKS} | readings(system, state)
+    out = combined(system, parts, engine.p) | {
         "discretisation_error": discretisation_error(state),
         "boundary_residual": _boundary_residual(engine, x, rate),
+    }
+    return {name: float(value) for name, value in out.items()}
+
+
+def readings(system: SurfaceSystem, state: State) -> dict[str, Any]:
+    """What observables read off a state at single points: `first`, `last` (n,), `scalars` (n_s,), and by names of their own."""
+    column = {name: i for i, name in enumerate(system.fields)}
+    out: dict[str, Any] = {
+        "first": state.nodes[0],
+        "last": state.nodes[-1],
+        "scalars": state.scalars,
+        "equator_radius": state.field(column["r"], np.array([0.5]))[0],
     }
     radius = neck_radius(state, column["r"])
     if radius is not None:
         out["neck_radius"] = radius
-    if "p" in scalars:
-        out |= _closed(state, column, integrals, scalars)
-        out |= _regulated(engine, state, column, integrals) if "c" in column else {}
-        out |= dict.fromkeys(("tension", "tension_pole"), scalars["sigma"]) if "sigma" in scalars else {}
     if "gamma" in system.algebraic:
-        out["tension_pole"] = float(state.algebraic_values(np.array([0.0]))[0, 0])
+        out["gamma_pole"] = state.algebraic_values(np.array([0.0]))[0, 0]
+    if "p" in system.scalars:
+        ends = np.array([0.0, 1.0])
+        poles = state.derivatives(ends)[:, column["psi"]]
+        out["poles"] = poles if "h" in system.scalars else poles / state.algebraic_values(ends)[:, -1]
+        if "c" in column:
+            out["ring_position"], out["max_concentration"] = largest_value(state, column["c"])
+    return out
+
+
+def combined(system: SurfaceSystem, parts: Mapping[str, Any], p: Any) -> dict[str, Any]:
+    """Observables from integrals, largest values and readings, of numbers or as a function to differentiate; p (n_p,)."""
+    scalars = dict(zip(system.scalars, parts["scalars"], strict=True))
+    z = system.fields.index("z")
+    out = {
+        "height": parts["first"][z] - parts["last"][z],
+        "max_meridional_curvature": parts["curvature"],
+        **{name: parts[name] for name in ("length", "equator_radius", "area", "bending_energy", "energy")},
+        **{name: parts[name] for name in ("reaction_rate",) if name in parts},
+        **_powers(system, parts),
+    }
+    if system.storages:
+        out["energy"] += system.stored_energy(p, {"p": parts["volume"], "sigma": parts["area"]})
+    if "neck_radius" in parts:
+        out["neck_radius"] = parts["neck_radius"]
+    if "p" in scalars:
+        out |= _closed(parts, scalars)
+        out |= _regulated(system, parts, p) if "c" in system.fields else {}
+        out |= dict.fromkeys(("tension", "tension_pole"), scalars["sigma"]) if "sigma" in scalars else {}
+    if "gamma_pole" in parts:
+        out["tension_pole"] = parts["gamma_pole"]
     if "p" not in scalars:
-        out["pulling_force"] = integrals["pulling_force"]
-        out["pulling_force_per_2pi"] = integrals["pulling_force"] / (2.0 * np.pi)
-    return {name: float(value) for name, value in out.items()}
+        out["pulling_force"] = parts["pulling_force"]
+        out["pulling_force_per_2pi"] = parts["pulling_force"] / (2.0 * np.pi)
+    return out
 
 
-def _powers(engine: Engine, integrals: dict[str, float], first: Array, last: Array) -> dict[str, float]:
+def _powers(system: SurfaceSystem, parts: Mapping[str, Any]) -> dict[str, Any]:
     """What is dissipated, by channel, and supplied; a rim lets matter in at the reservoir's tension, which does work."""
-    named = {name: integrals[name] for name in DISSIPATIONS if name in integrals}
-    work = {"force_power": integrals["force_power"], "boundary_power": boundary_power(engine.system, first, last)}
+    named = {name: parts[name] for name in DISSIPATIONS if name in parts}
+    work = {
+        "force_power": parts["force_power"],
+        "boundary_power": boundary_power(system, parts["first"], parts["last"]),
+    }
     return {"dissipation": sum(named.values()), **named, "external_power": sum(work.values()), **work}
 
 
@@ -97,38 +128,25 @@ def _boundary_residual(engine: Engine, x: Array, rate: Rate) -> float:
     return float(np.abs(engine.problem.residual(x, engine.p, rate)[-conditions:]).max())
 
 
-def _closed(
-    state: State, column: dict[str, int], integrals: dict[str, float], scalars: dict[str, float]
-) -> dict[str, float]:
+def _closed(parts: Mapping[str, Any], scalars: Mapping[str, Any]) -> dict[str, Any]:
     """Observables that only a closed surface has."""
-    ends = np.array([0.0, 1.0])
-    poles = state.derivatives(ends)[:, column["psi"]]
-    if "h" not in scalars:
-        poles = poles / state.algebraic_values(ends)[:, -1]
-    area, volume = integrals["area"], integrals["volume"]
+    area, volume = parts["area"], parts["volume"]
     return {
         "volume": volume,
         "reduced_volume": 6.0 * np.sqrt(np.pi) * volume / area**1.5,
         "pressure": scalars["p"],
         "velocity": scalars["v0"],
-        "polarity": 1.0 - poles[0] / poles[1],
+        "polarity": 1.0 - parts["poles"][0] / parts["poles"][1],
     }
 
 
-def _regulated(engine: Engine, state: State, column: dict[str, int], integrals: dict[str, float]) -> dict[str, float]:
+def _regulated(system: SurfaceSystem, parts: Mapping[str, Any], p: Any) -> dict[str, Any]:
     """Observables that only a surface with a regulator has."""
-    v = engine.values
-    c_pole = state.nodes[0, column["c"]]
-    position, largest = largest_value(state, column["c"])
-    out = {}
-    if "active_tension" in v:
-        hill = c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2)
-        out["tension_pole"] = v["tension"] + v["active_tension"] * hill
-    return out | {
-        "max_concentration": largest,
-        "ring_position": position,
-        **{name: integrals[name] for name in ("chemical_power", "amount", "amount_supply")},
-    }
+    v = dict(zip(system.parameters, p, strict=True))
+    c_pole = parts["first"][system.fields.index("c")]
+    hill = c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2)
+    names = ("max_concentration", "ring_position", "chemical_power", "amount", "amount_supply")
+    return {"tension_pole": v["tension"] + v["active_tension"] * hill, **{name: parts[name] for name in names}}
 
 
 def _samples(state: State) -> Array:

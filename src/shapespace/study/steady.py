@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Self
 
@@ -28,6 +29,7 @@ from shapespace.study.observables import energy_law, measure, shape_end
 from shapespace.study.paths import MAX_POINTS, NEWTON, StateName, along, read_state_name, steps
 from shapespace.study.presenting import Presented, Summary, quantities_table
 from shapespace.study.scenario import Scenario
+from shapespace.study.sensitivities import Sensitivities
 from shapespace.study.spectra import spectrum_at
 from shapespace.study.starts import Start, find_start
 from shapespace.study.vesicles import solve_vesicle
@@ -138,6 +140,31 @@ class Steady(Presented):
         """The state as a frame at time zero, to store or to start from."""
         return frame_of(self.problem.base, self.found.x, self.observables)
 
+    def sensitivity(self, observables: Sequence[str], keys: Sequence[str]) -> dict[str, dict[str, float]]:
+        """d(observable)/d(key) in the scenario's units, by observable and key; of all observables where none is named.
+
+        Each key with all others as they are given. InputError where this is no state, or one without derivatives.
+        """
+        return self._sensitivities.of_observables(observables, keys)
+
+    def outline(self, u: Array) -> Array:
+        """r and z (m, 2) of points of the outline at u (m,) in [0, 1], in the scenario's units; s = u L."""
+        fields = self.problem.base.system.fields
+        values = self.problem.base.unpack(self.found.x).values(np.asarray(u, float))
+        return np.asarray(values[:, [fields.index("r"), fields.index("z")]] * self.scenario.scales.factor("radius"))
+
+    def outline_sensitivity(self, u: Array, keys: Sequence[str]) -> Array:
+        """d(r, z)/d(key) (m, 2, n_keys) of these points, u held."""
+        return self._sensitivities.of_outline(np.asarray(u, float), keys)
+
+    @cached_property
+    def _sensitivities(self) -> Sensitivities:
+        if not self.found.outcome.is_success:
+            raise InputError(
+                f"there is no stationary state here ({self.outcome}) to differentiate: {self.outcome.advice}"
+            )
+        return Sensitivities(self.scenario, self.engine, self.found.x)
+
     def perturbed(self, amplitude: float, mode: int = 0, count: int = 6) -> Start:
         """The state x + amplitude Re(m) for a run to start from, m the mode of unit size of the leading rate number `mode`."""
         x = self.found.x + amplitude * self.spectrum(count).modes[mode].real
@@ -162,15 +189,18 @@ def steady_from(scenario: Scenario, state: State, keys: tuple[str, ...] = ()) ->
 
 
 def steady(
-    scenario: Scenario, *, state: StateName | str = StateName.DEFAULT, start: Start | str | Path | None = None
+    scenario: Scenario, *, state: StateName | str = StateName.DEFAULT, start: Steady | Start | str | Path | None = None
 ) -> Steady:
     """A stationary state: the named one of the scenario, or the one that a stored state becomes at its parameters.
 
-    start: `STORE` or `STORE:LABEL`, as text or as `find_start` returns it. The result's outcome says whether there is one.
+    start: another stationary state, or `STORE` or `STORE:LABEL`, as text or as `find_start` returns it. The outcome says whether
+    there is one.
     """
     name = read_state_name(state, scenario.kind)
     if start is None:
         return solve_steady(scenario, name)
+    if isinstance(start, Steady):
+        start = Start("the given state", start.scenario, start.frame)
     return steady_near(scenario, start if isinstance(start, Start) else find_start(start))
 
 

@@ -10,11 +10,12 @@ from u = 0 to 1 (`boundary_power`): shape coordinates are held or free of force 
 """
 
 import math
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 
-from shapespace.base.arrays import Array, Traced
+from shapespace.base.arrays import Traced
 from shapespace.geometry.curve import area_element, meridional_curvature, volume_element
 from shapespace.physics.bending import HelfrichBending
 from shapespace.physics.force import AxialForce
@@ -68,11 +69,12 @@ def channels(terms: tuple[AbstractTerm, ...]) -> tuple[Ledger, ...]:
     return tuple(channel for channel in CHANNELS if any(term.ledger is channel for term in terms))
 
 
-def boundary_power(system: SurfaceSystem, y0: Array, y1: Array) -> float:
-    """2 pi [P_v v_u + P_phi v_phi] between the fields at u = 0 and at u = 1: the work of whatever drives the ends."""
+def boundary_power(system: SurfaceSystem, y0: Any, y1: Any) -> Any:
+    """2 pi [P_v v_u + P_phi v_phi] between the fields (n,) at u = 0 and at u = 1: the work of whatever drives the ends."""
+    column = {name: i for i, name in enumerate(system.fields)}
+    pairs = [("meridional_force", "v"), *([("azimuthal_force", "v_phi")] if "v_phi" in column else [])]
 
-    def work(y: Array) -> float:
-        f = dict(zip(system.fields, y.tolist(), strict=True))
-        return float(f["meridional_force"] * f["v"] + f.get("azimuthal_force", 0.0) * f.get("v_phi", 0.0))
+    def work(y: Any) -> Any:
+        return sum(y[column[force]] * y[column[velocity]] for force, velocity in pairs)
 
     return 2.0 * math.pi * (work(y1) - work(y0))

@@ -275,9 +275,10 @@ class SurfaceSystem(AbstractSystem):
             ]
         )
 
-    def stored_energy(self, p: Traced, sizes: Mapping[str, float]) -> float:
+    def stored_energy(self, p: Traced, sizes: Mapping[str, Any]) -> Any:
         """Of what is held elastically, at sizes given by their multipliers."""
-        return float(sum(law(self.named(p)).energy(jnp.asarray(sizes[name])) for name, law in self.storages))
+        named = self.named(jnp.asarray(p))
+        return sum(law(named).energy(jnp.asarray(sizes[name])) for name, law in self.storages)
 
 
 def make_surface_system(
