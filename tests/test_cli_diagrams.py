@@ -1,6 +1,7 @@
 """The command `diagram` and its figure, with the real solver on swimmers."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,30 @@ def test_diagram_maps_and_draws_swimmers(shell: Shell):
     assert any(one.get_hatch() == HATCH for one in map_axes.collections)
     assert "no observable of this diagram" in one_complaint(shell("plot", "map", "--of", "wings"))
     assert "holds a diagram already" in one_complaint(shell(*COMMAND, *AXES, "--out", "map"))
+    before = {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in Path("map").rglob("*") if path.is_file()}
+    others = (
+        [*AXES[:2], "-y", "inverse_hydrodynamic_length=1:3:2"],
+        [*AXES, "-s", "turnover_rate=8"],
+        [*AXES, "--stability"],
+    )
+    for other in others:
+        assert "resume with the same value" in one_complaint(shell(*COMMAND, *other, "--out", "map", "--resume"))
+    assert before == {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in before}
+
+
+def test_a_cluster_that_cannot_help_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch):
+    """No scheduler, and a worker with another version of the package: nothing is written."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("shapespace.study.cluster.SECONDS", 0.5)
+    command = (*COMMAND[:-2], *AXES, "--out", "map", "--dask")
+    assert "no scheduler answers there" in one_complaint(shell(*command, "tcp://127.0.0.1:9"))
+    monkeypatch.setattr("shapespace.study.cluster.SECONDS", 60.0)
+    monkeypatch.setattr("shapespace.study.cluster._version", lambda: "0.0.9")
+    options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster:
+        complaint = one_complaint(shell(*command, cluster.scheduler_address))
+    assert re.search(r"has shapespace 0\.0\.9, not .*; install the same version there", complaint)
+    assert not Path("map").exists()
 
 
 def test_a_map_without_states_is_no_success(shell: Shell):
@@ -61,6 +86,7 @@ def test_a_map_without_states_is_no_success(shell: Shell):
     [
         (["-x", "peclet=20:30:1", "-y", "turnover_rate=5:6:2"], "must have 2 to"),
         (["-x", "peclet=30:20:4", "-y", "turnover_rate=5:6:2"], "must run upwards"),
+        (["-x", "peclet=20:20:4", "-y", "turnover_rate=5:6:2"], "must run upwards"),
         (["-x", "pecelt=20:30:4", "-y", "turnover_rate=5:6:2"], "the nearest valid one is peclet"),
         (["-x", "peclet=20:30:4", "-y", "turnover_rate=0:6:2"], "turnover_rate = 0"),
         (["-x", "peclet=20:30:4"], "y"),

@@ -2,15 +2,19 @@
 
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
+from docs.executed import blocks_of
 
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
@@ -188,31 +192,38 @@ def test_tiles_cover_the_grid_once():
         assert (met == 1).all()
 
 
-def test_workers_give_the_same_map_and_may_be_killed(stored: Diagram, tmp_path: Path):
-    """A killed worker's tile is computed by another; no process is left."""
-    request = stored.request
-    names = [
-        str(name)
-        for name in stored.dataset.data_vars
-        if name not in ("outcome", "correction", "iterations", "elements")
-    ]
-    with DiagramStore.create(tmp_path / "d", stored.scenario, request, names) as store:
-        for anchors in DiagramStore.open(stored.store):
-            store.append(anchors)
-        done: list[Done] = []
-        with Workers(2) as workers:
-            for one in workers.map(store.path, request.grid.tiles):
-                if not done:
-                    os.kill(workers.pids[0], signal.SIGKILL)
-                done.append(one)
-            pids = workers.pids
-    assert sorted(one.tile for one in done) == sorted(request.grid.tiles)
-    assert pids
-    assert not [pid for pid in pids if Path(f"/proc/{pid}").exists()]
-    one, other = open_diagram(tmp_path / "d").dataset, stored.dataset
+def without(stored: Diagram, out: Path, tiles: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    """Copy a store and take some tiles out of it; these."""
+    shutil.copytree(stored.store, out)
+    for i, j in tiles:
+        for chunk in [*out.rglob(f"c/0/{j}/{i}")]:
+            chunk.unlink()
+    missing = DiagramStore.open(out).missing_tiles
+    assert sorted(missing) == sorted(tiles)
+    return missing
+
+
+def assert_same(out: Path, stored: Diagram) -> None:
+    one, other = open_diagram(out).dataset, stored.dataset
     for name in other.data_vars:
         if name != "iterations":  # from a start as good as converged, round-off decides whether one is enough
             np.testing.assert_allclose(one[name], other[name], rtol=1e-9, atol=1e-9, err_msg=str(name))
+
+
+def test_workers_give_the_same_map_and_may_be_killed(stored: Diagram, tmp_path: Path):
+    """A killed worker's tile is computed by another; no process is left."""
+    tiles = without(stored, tmp_path / "d", [(0, 1), (1, 0), (1, 1)])
+    done: list[Done] = []
+    with Workers(2) as workers:
+        for one in workers.map(tmp_path / "d", tiles):
+            if not done:
+                os.kill(workers.pids[0], signal.SIGKILL)
+            done.append(one)
+        pids = workers.pids
+    assert sorted(one.tile for one in done) == sorted(tiles)
+    assert pids
+    assert not [pid for pid in pids if Path(f"/proc/{pid}").exists()]
+    assert_same(tmp_path / "d", stored)
 
 
 @pytest.mark.slow
@@ -240,7 +251,7 @@ def test_a_killed_client_leaves_no_process_and_loses_nothing(name: str, request:
     missing = DiagramStore.open(out).missing_tiles
     assert len(missing) <= 4 - len(finished)
     times = {path: path.stat().st_mtime_ns for path in finished}
-    found = diagram(
+    diagram(
         swimmer(),
         *axes,
         states=("trivial", "default"),
@@ -250,21 +261,58 @@ def test_a_killed_client_leaves_no_process_and_loses_nothing(name: str, request:
         resume=True,
     )
     assert times == {path: path.stat().st_mtime_ns for path in finished}
-    for variable in known.dataset.data_vars:
-        np.testing.assert_allclose(
-            found.dataset[variable], known.dataset[variable], rtol=1e-9, atol=1e-9, err_msg=str(variable)
-        )
+    assert_same(out, known)
 
 
 def test_a_cluster_gives_the_same_map(stored: Diagram, tmp_path: Path):
     distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    tiles, done = without(stored, tmp_path / "d", [(0, 1), (1, 1)]), list[Done]()
     with distributed.LocalCluster(**options) as cluster:
-        found = diagram(
-            swimmer(), X, Y, states=("trivial", "default"), out=tmp_path / "d", dask=cluster.scheduler_address
-        )
-    for name in stored.dataset.data_vars:
-        np.testing.assert_allclose(found.dataset[name], stored.dataset[name], rtol=1e-9, atol=1e-9, err_msg=str(name))
+        choices = {"states": ("trivial", "default"), "resume": True, "progress": done.append}
+        diagram(swimmer(), X, Y, out=tmp_path / "d", dask=cluster.scheduler_address, **choices)
+    assert sorted(one.tile for one in done) == sorted(tiles)
+    assert_same(tmp_path / "d", stored)
+
+
+def slurm_cluster(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The cluster of the page on maps, which submits nothing."""
+    jobqueue = pytest.importorskip("dask_jobqueue")
+    monkeypatch.setattr(jobqueue.SLURMCluster, "scale", lambda self, jobs: None)
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "map-shape-space.md"
+    (block,) = [one.text for one in blocks_of(page) if "SLURMCluster" in one.text]
+    names: dict[str, Any] = {}
+    exec(block, names)
+    return names["cluster"]
+
+
+def test_the_job_script_for_slurm(monkeypatch: pytest.MonkeyPatch):
+    """One core, memory and time as asked for, one thread, and a worker of this interpreter for this scheduler."""
+    with slurm_cluster(monkeypatch) as cluster:
+        lines = cluster.job_script().splitlines()
+        address = cluster.scheduler_address
+    assert lines[0].startswith("#!/")
+    assert {"#SBATCH -n 1", "#SBATCH --cpus-per-task=1", "#SBATCH -t 01:00:00", "export OMP_NUM_THREADS=1"} <= {*lines}
+    assert [line for line in lines if re.fullmatch(r"#SBATCH --mem=[12]G", line)]
+    (start,) = [line for line in lines if "dask_worker" in line]
+    assert start.startswith(f"{sys.executable} -m distributed.cli.dask_worker {address} ")
+    assert "--nthreads 1" in start
+
+
+@pytest.mark.slow
+def test_a_job_of_the_script_computes_a_map(stored: Diagram, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """What SLURM would start on a node, started here."""
+    with slurm_cluster(monkeypatch) as cluster:
+        script = tmp_path / "job.sh"
+        script.write_text(cluster.job_script())
+        job = subprocess.Popen(["bash", str(script)], cwd=tmp_path, start_new_session=True)
+        try:
+            axes, address = (X, Y), cluster.scheduler_address
+            diagram(swimmer(), *axes, states=("trivial", "default"), out=tmp_path / "d", dask=address)
+        finally:
+            os.killpg(job.pid, signal.SIGKILL)
+            job.wait()
+    assert_same(tmp_path / "d", stored)
 
 
 def test_no_scheduler_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -1,5 +1,6 @@
 """Tiles computed by the workers of a Dask cluster, wherever its scheduler is; they must see the directory of the store."""
 
+import platform
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
@@ -16,7 +17,10 @@ RETRIES = 2
 
 
 class Cluster:
-    """The cluster of a scheduler's address, e.g. tcp://host:8786. InputError where none answers."""
+    """The cluster of a scheduler's address, e.g. tcp://host:8786.
+
+    InputError where none answers, and where a worker that is there has another version of this package or none.
+    """
 
     def __init__(self, address: str) -> None:
         try:
@@ -32,6 +36,12 @@ class Cluster:
             raise InputError(
                 f"--dask {address}: no scheduler answers there ({reason}); start one, or correct the address."
             ) from None
+        try:
+            for worker, mine in self._client.run(_version, on_error="return").items():
+                _check_version(mine, own_versions()["shapespace"], worker)
+        except BaseException:
+            self._client.close()
+            raise
 
     def map(self, path: Path, tiles: Sequence[Tile]) -> Iterator[Done]:
         """Compute tiles of a stored diagram, in whatever order they are finished.
@@ -63,8 +73,19 @@ class Cluster:
         self._client.close()
 
 
+def _version() -> str:
+    """Of this package, on a worker."""
+    return own_versions()["shapespace"]
+
+
+def _check_version(mine: str | BaseException, wanted: str, worker: str) -> None:
+    """InputError unless a worker has the wanted version."""
+    if mine != wanted:
+        has = f"shapespace {mine}" if isinstance(mine, str) else f"no shapespace ({mine})"
+        raise InputError(f"--dask: the worker {worker} has {has}, not {wanted}; install the same version there.")
+
+
 def _compute(path: str, tile: Tile, wanted: str) -> Any:
-    """A tile, on a worker."""
-    if (mine := own_versions()["shapespace"]) != wanted:
-        raise InputError(f"--dask: a worker has shapespace {mine}, not {wanted}; install the same version there.")
+    """A tile, on a worker, which may have come after the others."""
+    _check_version(_version(), wanted, platform.node())
     return compute_tile(path, tile)
