@@ -74,7 +74,7 @@ def diagram(
         sizes = {tile: (1 if branches else len(states)) * _size(grid, tile) for tile in grid.tiles}
         if ready is not None:
             ready(sum(sizes.values()) - sum(sizes[tile] for tile in missing), sum(sizes.values()))
-        _lay_anchors(store)
+        lay_anchors(store)
         for done in engine.map(store.path, missing):
             if progress is not None:
                 progress(done)
@@ -115,7 +115,7 @@ def make_request(
     return DiagramRequest(grid, names, stability, branches, tuple(map(str, origins)), adaptive)
 
 
-def _lay_anchors(store: DiagramStore) -> None:
+def lay_anchors(store: DiagramStore) -> None:
     """Store what is missing of the anchors."""
     request, scenario = store.request, store.scenario
     if request.branches:
