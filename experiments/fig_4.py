@@ -9,7 +9,8 @@ without mirror symmetry: the scenario ring-slipping. Units: R0, kappa, tau = eta
 Run:   python experiments/fig_4.py [--quick] [--out DIR]        Time: 1 min on one core, --quick 30 s.
 
 Expect: the maximum of the concentration stays at u = 1/2 first and ends at a pole; before that the equator is pinched; the
-speed, zero at first, is largest in the end, which is the stationary swimmer found directly.
+speed, zero at first, peaks as the pinched-off part is drawn in, and stays in the end, which is the stationary swimmer found
+directly.
 """
 
 from pathlib import Path

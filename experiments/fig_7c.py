@@ -11,7 +11,7 @@ kappa, tau = eta_b R0^2/kappa.
 Run:   python experiments/fig_7c.py [--quick] [--out DIR]        Time: 15 min on one core, --quick 3 min.
 
 Expect: the surface is stable for k above a threshold, which is 37.594 at R0/L_h = 0.3 (Fig. 7d), and falls with R0/L_h
-first; the boundary is not monotonic, and around R0/L_h = 4.6 a finger of instability reaches to just below k = 30, so
+first; the boundary is not monotonic, and around R0/L_h = 4.6 a finger of instability reaches to k = 30.05, so
 that at k = 28 stability is lost and found again at R0/L_h = 4.32662 and 4.84038 (Fig. S1).
 """
 
