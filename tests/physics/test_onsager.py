@@ -148,11 +148,12 @@ def test_both_forms_of_the_active_coupling_move_a_surface_alike():
         assert np.abs(second.x - first.x).max() < 1e-11 * np.abs(first.x).max()
     found = [path[-1] for path in moments]
     one, other = (measure(engine, m.x, m.rate) for engine, m in zip((fixed, rates), found, strict=True))
+    # The largest unknowns are some hundred: what agrees to 1e-11 of them agrees to 1e-9 here.
     heat = mobility * potential**2 * one["area"]
-    assert other["chemical_dissipation"] == pytest.approx(heat, rel=1e-10)
-    assert other["chemical_power"] - one["chemical_power"] == pytest.approx(heat, rel=1e-9)
+    assert other["chemical_dissipation"] == pytest.approx(heat, rel=1e-9)
+    assert other["chemical_power"] - one["chemical_power"] == pytest.approx(heat, rel=1e-8)
     assert potential * other["reaction_rate"] == pytest.approx(other["chemical_power"], rel=1e-12)
     assert "reaction_rate" not in one
-    assert other["dissipation"] - one["dissipation"] == pytest.approx(heat, rel=1e-9)
+    assert other["dissipation"] - one["dissipation"] == pytest.approx(heat, rel=1e-8)
     rests = [v["dissipation"] - v["chemical_power"] - v["external_power"] for v in (one, other)]
-    assert rests[1] == pytest.approx(rests[0], abs=1e-10 * one["dissipation"])
+    assert rests[1] == pytest.approx(rests[0], abs=1e-9 * one["dissipation"])
