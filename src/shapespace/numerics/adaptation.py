@@ -20,12 +20,8 @@ def highest_derivative(state: State) -> Array:
     On an element y has degree k, so y^(k) is constant there; its jumps to the neighbours over the distance of their
     centres estimate y^(k+1), as in COLSYS and AUTO.
     """
-    rule, widths = state.rule, state.widths
-    k = rule.degree
-    # The (k-1)-th derivative of the slope's interpolant: (k-1)! sum_l slope_l / prod_(m != l) (x_l - x_m), over w^(k-1).
-    difference = rule.points[:, None] - rule.points[None, :] + np.eye(k)
-    leading = np.prod(np.arange(1.0, k)) / difference.prod(axis=1)
-    top = np.einsum("l,eln->en", leading, state.slopes) / widths[:, None] ** (k - 1)
+    widths, k = state.widths, state.rule.degree
+    top = np.einsum("l,eln->en", state.rule.highest_derivative(), state.slopes) / widths[:, None] ** (k - 1)
     distance = 0.5 * (widths[1:] + widths[:-1])
     jumps = np.abs(np.diff(top, axis=0)) / distance[:, None]
     padded = np.concatenate([jumps[:1], jumps, jumps[-1:]])
@@ -69,5 +65,6 @@ def _largest_load(mesh: Array, density: Array, moved: Array) -> float:
     """Largest monitor value times width on the elements of `moved`, the monitor being constant on those of `mesh`."""
     first = np.searchsorted(mesh, moved[:-1], side="right") - 1
     last = np.maximum(np.searchsorted(mesh, moved[1:], side="left"), first + 1)
-    peaks = np.array([density[a:b].max() for a, b in zip(first, last, strict=True)])
+    # reduceat wants every index within the array, and returns the stretches from `last` to the next `first` as well.
+    peaks = np.maximum.reduceat(np.append(density, 0.0), np.stack([first, last], axis=1).ravel())[::2]
     return float((peaks * np.diff(moved)).max())

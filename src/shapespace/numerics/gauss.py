@@ -38,6 +38,10 @@ class GaussRule:
         """max over x of |prod_l (x - x_l) integrated|: the factor of w^(k+1) y^(k+1) in the interpolation error."""
         return _interpolation_constant(self.degree)
 
+    def highest_derivative(self) -> Array:
+        """Weights (k,) of values at the points in the (k-1)-th derivative of their interpolant."""
+        return _highest_derivative(self.degree)
+
 
 def _legendre(x: Array, degree: int) -> Array:
     """P_0 .. P_degree at x (m,), (m, degree + 1): for few points ten times as fast as numpy's legvander."""
@@ -71,6 +75,14 @@ def _interpolation_constant(degree: int) -> float:
     nodal = np.prod(x[:, None] - gauss_rule(degree).points, axis=1)
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (nodal[1:] + nodal[:-1])) * (x[1] - x[0])])
     return float(np.abs(integral).max() / np.prod(np.arange(1.0, degree + 1)))
+
+
+@cache
+def _highest_derivative(degree: int) -> Array:
+    """(k-1)! / prod_(m != l) (x_l - x_m)."""
+    points = gauss_rule(degree).points
+    difference = points[:, None] - points[None, :] + np.eye(degree)
+    return np.asarray(np.prod(np.arange(1.0, degree)) / difference.prod(axis=1))
 
 
 @cache

@@ -30,25 +30,40 @@ def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, point
     n_s, n_p = x.shape[0] - scalars, p.shape[0]
     n_points, moves = elements * k, history.shape[0] > 0
     n_tiles = (n_points + size - 1) // size
-    first_ends = (2 * n + n_a + n_q + 1) * size
+    columns = 2 * n + n_a + n_q + 1
+    first_ends = columns * size
     out = np.zeros((n_tiles, first_ends + n_s + 2 * n + 2 * n_q + 1 + n_p))
-    for point in range(n_tiles * size):
-        j, e = divmod(min(point, n_points - 1), elements)
-        column = out[point // size, point % size : first_ends : size]
-        width, own = mesh[e + 1] - mesh[e], e * k + j
-        left, inside = x[e * n : (e + 1) * n], x[slopes + e * k * n : slopes + (e + 1) * k * n].reshape(k, n)
-        for c in range(n):
-            value = 0.0
-            for l in range(k):
-                value += matrix[j, l] * inside[l, c]
-            column[c] = inside[j, c]
-            column[n + n_a + c] = left[c] + width * value
-        for c in range(n_a):
-            column[n + c] = x[algebraic + own * n_a + c]
-        if moves:
-            for c in range(n_q):
-                column[2 * n + n_a + c] = history[own * n_q + c]
-        column[2 * n + n_a + n_q] = mesh[e] + width * stages[j]
+    # Column by column, each over all points and then cut into tiles: what is written lies side by side.
+    column = np.empty(n_tiles * size)
+    for c in range(columns):
+        if 2 * n + n_a <= c < columns - 1 and not moves:
+            continue
+        for j in range(k):
+            own = column[j * elements : (j + 1) * elements]
+            if c < n:
+                for e in range(elements):
+                    own[e] = x[slopes + (e * k + j) * n + c]
+            elif c < n + n_a:
+                for e in range(elements):
+                    own[e] = x[algebraic + (e * k + j) * n_a + c - n]
+            elif c < 2 * n + n_a:
+                field = c - n - n_a
+                own[:] = 0.0
+                for l in range(k):
+                    share, first = matrix[j, l], slopes + l * n + field
+                    for e in range(elements):
+                        own[e] += share * x[first + e * k * n]
+                for e in range(elements):
+                    own[e] = x[e * n + field] + (mesh[e + 1] - mesh[e]) * own[e]
+            elif c < columns - 1:
+                for e in range(elements):
+                    own[e] = history[(e * k + j) * n_q + c - 2 * n - n_a]
+            else:
+                for e in range(elements):
+                    own[e] = mesh[e] + (mesh[e + 1] - mesh[e]) * stages[j]
+        column[n_points:] = column[n_points - 1]
+        for index in range(n_tiles):
+            put(out[index, c * size :], column[index * size : (index + 1) * size])
     for index in range(n_tiles):
         ends = out[index, first_ends:]
         put(ends, x[scalars:])

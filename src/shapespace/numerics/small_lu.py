@@ -66,17 +66,23 @@ def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]  # n
                 factor = a[i, j]
                 for c in range(stop, cols):
                     a[i, c] -= factor * a[j, c]
+        # Whole panels take two rows at once, which share what is loaded of the panel.
+        i = stop
         if stop - start == 4:
-            for i in range(stop, rows):
+            while i + 2 <= rows:
                 f0, f1, f2, f3 = a[i, start], a[i, start + 1], a[i, start + 2], a[i, start + 3]
+                g0, g1, g2, g3 = a[i + 1, start], a[i + 1, start + 1], a[i + 1, start + 2], a[i + 1, start + 3]
                 for c in range(stop, cols):
-                    a[i, c] -= f0 * a[start, c] + f1 * a[start + 1, c] + f2 * a[start + 2, c] + f3 * a[start + 3, c]
-        else:
-            for i in range(stop, rows):
-                for j in range(start, stop):
-                    factor = a[i, j]
-                    for c in range(stop, cols):
-                        a[i, c] -= factor * a[j, c]
+                    u0, u1, u2, u3 = a[start, c], a[start + 1, c], a[start + 2, c], a[start + 3, c]
+                    a[i, c] -= f0 * u0 + f1 * u1 + f2 * u2 + f3 * u3
+                    a[i + 1, c] -= g0 * u0 + g1 * u1 + g2 * u2 + g3 * u3
+                i += 2
+        while i < rows:
+            for j in range(start, stop):
+                factor = a[i, j]
+                for c in range(stop, cols):
+                    a[i, c] -= factor * a[j, c]
+            i += 1
     return True
 
 
@@ -98,13 +104,28 @@ def forward(lu, pivot, x):  # type: ignore[no-untyped-def]  # numba finds the ty
 
 @compiled
 def backward(lu, size, x):  # type: ignore[no-untyped-def]  # numba finds the types
-    """Solve U x = b in place for the leading `size` unknowns; any x beyond them is known and stays."""
+    """Solve U x = b in place for the leading `size` unknowns; any x beyond them is known and stays.
+
+    Eight sums run side by side: a single one waits for each addition, and rows are too short for the compiler to split it.
+    """
+    known = x.shape[0]
+    for i in range(size):
+        row, j = lu[i], size
+        t0 = t1 = t2 = t3 = t4 = t5 = t6 = t7 = 0.0
+        while j + 8 <= known:
+            t0, t1 = t0 + row[j] * x[j], t1 + row[j + 1] * x[j + 1]
+            t2, t3 = t2 + row[j + 2] * x[j + 2], t3 + row[j + 3] * x[j + 3]
+            t4, t5 = t4 + row[j + 4] * x[j + 4], t5 + row[j + 5] * x[j + 5]
+            t6, t7 = t6 + row[j + 6] * x[j + 6], t7 + row[j + 7] * x[j + 7]
+            j += 8
+        while j < known:
+            t0 += row[j] * x[j]
+            j += 1
+        x[i] -= ((t0 + t1) + (t2 + t3)) + ((t4 + t5) + (t6 + t7))
     for i in range(size - 1, -1, -1):
-        row = lu[i]
-        total = 0.0
-        for j in range(i + 1, x.shape[0]):
-            total += row[j] * x[j]
-        x[i] = (x[i] - total) / row[i]
+        x[i] /= lu[i, i]
+        for c in range(i):
+            x[c] -= lu[c, i] * x[i]
 
 
 @compiled
