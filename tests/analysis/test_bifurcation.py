@@ -13,7 +13,7 @@ from shapespace.analysis.bifurcation import (
 from shapespace.analysis.singular import SingularProblem
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.newton import Newton, solve_root
 from shapespace.study.verification.classic import at_rest, bratu, chafee_infante
@@ -24,7 +24,7 @@ BRATU_FOLD = 3.513830719125161
 
 def solved(problem: CollocationProblem, p: Array) -> Array:
     x = at_rest(problem)
-    root = solve_root(problem, x, p, Rate.of_growth(problem.stored(x, p)), Newton(1e-12))
+    root = solve_root(problem, x, p, REST, Newton(1e-12))
     assert root.outcome is Outcome.CONVERGED
     return root.x
 
@@ -32,7 +32,7 @@ def solved(problem: CollocationProblem, p: Array) -> Array:
 def bratu_fold(elements: int, degree: int) -> SingularPoint:
     problem, p = bratu(elements, degree), np.array([3.4])
     x = solved(problem, p)
-    _, linearisation = problem.linearise(x, p, Rate.of_growth(problem.stored(x, p)))
+    _, linearisation = problem.linearise(x, p, REST)
     mode = linearisation.solve(problem.derivative(x, p, np.zeros_like(x), np.ones(1)))
     point = locate_fold(problem, 0, x, p, mode)
     assert isinstance(point, SingularPoint)
@@ -91,7 +91,7 @@ def test_the_defining_jacobian_is_the_derivative(is_fold: bool):
         assert isinstance(point, SingularPoint)
         system = SingularProblem(problem, 0, point.kernel)
         big_x = np.append(point.x, [point.parameter, 0.0])
-    rest = Rate.of_growth(system.stored(big_x, point.p))
+    rest = REST
     residual, linearisation = system.linearise(big_x, point.p, rate=rest)
     assert np.abs(residual).max() < 1e-9
     rng = np.random.default_rng(0)

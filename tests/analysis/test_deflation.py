@@ -27,7 +27,7 @@ from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.analysis.tracing import Located, traced
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractSmoothProblem, Rate
+from shapespace.base.problem import REST, AbstractSmoothProblem
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.study.verification.classic import at_rest, bratu
 
@@ -159,12 +159,12 @@ def test_the_deflated_jacobian_is_the_derivative():
     known = [solve_stationary(problem, np.array(x), p) for x in ((1.1, 2.1), (-2.1, -1.0))]
     deflated = DeflatedProblem.of(problem, known, Deflation(power=3.0, shift=0.5))
     x, rng = np.array([0.4, 1.3]), np.random.default_rng(0)
-    rest = Rate.of_growth(problem.stored(x, p))
+    rest = REST
     residual, linearisation = deflated.linearise(x, p, rest)
     np.testing.assert_allclose(residual, deflated.residual(x, p, rest))
     for rhs in rng.standard_normal((3, 2)):
         step = linearisation.solve(rhs)
-        ahead, behind = (deflated.residual(x + h * step, p, Rate.of_growth(x + h * step)) for h in (1e-6, -1e-6))
+        ahead, behind = (deflated.residual(x + h * step, p, REST) for h in (1e-6, -1e-6))
         np.testing.assert_allclose((ahead - behind) / 2e-6, rhs, rtol=1e-6, atol=1e-8)
 
 

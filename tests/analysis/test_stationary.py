@@ -10,7 +10,7 @@ from shapespace.analysis.extended import AbstractMeasure, Affine, ExtendedProble
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractContinuableProblem, Rate
+from shapespace.base.problem import REST, AbstractContinuableProblem
 from shapespace.numerics.adaptation import discretisation_error
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.newton import Newton, solve_root
@@ -128,7 +128,7 @@ def test_a_given_observable_frees_a_parameter():
     extended = ExtendedProblem(problem, (0,), (Given(Middle(), 4.091467246189261),))
     start = solved_bratu(3.4)
     x = start.problem.carried(start.x, problem)
-    root = solve_root(extended, extended.joined(x, start.p), start.p, Rate.of_growth(problem.stored(x, start.p)), TIGHT)
+    root = solve_root(extended, extended.joined(x, start.p), start.p, REST, TIGHT)
     assert root.outcome is Outcome.CONVERGED
     assert root.x[-1] == pytest.approx(1.0, abs=1e-9)
 
@@ -142,7 +142,7 @@ def test_the_extended_jacobian_is_the_derivative():
     extended = ExtendedProblem(problem, (1, 0), (plane, Given(Parameter(0), 1.0)))
     X, dX = extended.joined(x, p), rng.standard_normal(len(x) + 2)
     np.testing.assert_array_equal(extended.split(X, np.zeros(2))[1], p)
-    rate = Rate.of_growth(problem.stored(x, p))
+    rate = REST
     ahead, behind = (extended.residual(X + h * dX, p, rate) for h in (1e-5, -1e-5))
     derivative = extended.derivative(X, p, dX)
     np.testing.assert_allclose((ahead - behind) / 2e-5, derivative, atol=1e-7)

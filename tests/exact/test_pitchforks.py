@@ -6,7 +6,7 @@ import pytest
 from shapespace.analysis.bifurcation import Kind, SingularPoint, locate_branch_point
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 from shapespace.numerics.newton import Newton, solve_root
 from shapespace.study.engine import Engine
 from shapespace.study.keyed import KeyedProblem
@@ -19,7 +19,7 @@ def resting(case: Scenario, key: str) -> tuple[KeyedProblem, Array, Array, Array
     problem, engine = KeyedProblem.of(case, (key,)), Engine.of(case)
     p = np.array([float(case.values()[key])])
     x = problem.base.pack(engine.initial_state())
-    rest = Rate.of_growth(problem.stored(x, p))
+    rest = REST
     root = solve_root(problem, x, p, rest, Newton(1e-11))
     assert root.outcome is Outcome.CONVERGED
     _, linearisation = problem.linearise(root.x, p, rest)

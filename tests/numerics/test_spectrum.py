@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
 from shapespace.base.arrays import Array, Traced
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractLinearisation, Border, Rate
+from shapespace.base.problem import REST, AbstractLinearisation, Border, Rate
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.newton import Newton, solve_root
@@ -82,7 +82,7 @@ def bratu_state(problem: CollocationProblem, guess: float) -> Array:
         lambda u: np.stack([slope(u), bend(u)], axis=1),
     )
     p = np.array([1.0])
-    root = solve_root(problem, x, p, Rate.of_growth(problem.stored(x, p)), Newton())
+    root = solve_root(problem, x, p, REST, Newton())
     assert root.outcome is Outcome.CONVERGED
     return root.x
 
@@ -218,7 +218,7 @@ def test_a_neighbour_tells_where_to_look():
     x = at_rest(problem)
     first = solve_spectrum(problem, x, np.array([10.0]))
     p = np.array([10.5])
-    rest = problem.linearise(x, p, Rate.of_growth(problem.stored(x, p)))[1]
+    rest = problem.linearise(x, p, REST)[1]
     second = solve_spectrum(problem, x, p, near=first, rest=rest)
     assert second.converged
     assert second.n_unstable == 3

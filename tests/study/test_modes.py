@@ -7,7 +7,7 @@ import pytest
 
 import shapespace as ss
 from shapespace.base.errors import InputError
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.modes import CRITICAL, find_modes, neutral_modes, store_modes
 from shapespace.study.run import store_frame
@@ -44,7 +44,7 @@ def test_without_turnover_the_amount_of_regulator_is_neutral(sphere: Steady):
     """The resting sphere does not depend on k; its l = 0 rate is -k, which at k = 0 belongs to the conserved amount."""
     problem = KeyedProblem.of(sphere.scenario, ("turnover_rate",))
     x, p = sphere.found.x, np.zeros(1)
-    rest = Rate.of_growth(problem.stored(x, p))
+    rest = REST
     assert np.abs(problem.residual(x, p, rest)).max() < 1e-10
     spectrum = spectrum_at(problem, x, p, count=6)
     place = int(np.argmin(np.abs(spectrum.rates)))

@@ -5,7 +5,7 @@ import pytest
 
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 from shapespace.numerics.newton import solve_root
 from shapespace.study.run import run
 from shapespace.study.scenario import scenario
@@ -20,7 +20,7 @@ def assert_solved(steady: Steady) -> None:
     problem = again.problem
     p = key_values(steady.scenario, steady.problem.keys)
     x = problem.base.pack(state_of(steady.frame))
-    root = solve_root(problem, x, p, Rate.of_growth(problem.stored(x, p)), NEWTON)
+    root = solve_root(problem, x, p, REST, NEWTON)
     assert root.outcome is Outcome.CONVERGED
     assert root.iterations <= 2
 

@@ -8,7 +8,7 @@ import numpy as np
 from shapespace.analysis.singular import SingularProblem, probe
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractProblem, AbstractSmoothProblem, Border, Rate
+from shapespace.base.problem import REST, AbstractSmoothProblem, Border
 from shapespace.numerics.newton import Newton, Root, solve_root
 
 LOCATION = Newton(tolerance=1e-10, max_iterations=30)
@@ -100,7 +100,7 @@ def solve_singular(problem: AbstractSmoothProblem, index: int, x: Array, p: Arra
     """
     start = SingularProblem(problem, index, kernel)
     guess = np.append(x, [p[index], 0.0][: len(kernel)])
-    return solve_root(start, guess, p, _rest(problem, x, p), LOCATION)
+    return solve_root(start, guess, p, REST, LOCATION)
 
 
 def second_direction(problem: AbstractSmoothProblem, index: int, x: Array, p: Array, tangent: Array) -> Array:
@@ -115,7 +115,7 @@ def second_direction(problem: AbstractSmoothProblem, index: int, x: Array, p: Ar
     slope = problem.derivative(x, p, np.zeros_like(x), unit)
     row = weights * tangent
     border = Border(slope[None], row[None, :-1], np.array([[row[-1]]]))
-    _, linearisation = problem.linearise(x, p, _rest(problem, x, p), border)
+    _, linearisation = problem.linearise(x, p, REST, border)
     images = np.stack([linearisation.solve(np.append(probe(len(x), number), 0.0)) for number in range(PROBES)])
     images = images / np.sqrt(images**2 @ weights)[:, None]
     _, _, shared = np.linalg.svd(images * np.sqrt(weights), full_matrices=False)
@@ -150,11 +150,7 @@ def parameter_error(final: SingularProblem, big_x: Array, p: Array) -> float:
     if finer is None:
         return float(left)
     start = final.carried(big_x, finer)
-    root = solve_root(finer, start, p, _rest(finer, start, p), LOCATION)
+    root = solve_root(finer, start, p, REST, LOCATION)
     if root.outcome is not Outcome.CONVERGED:
         return float("nan")
     return float(SAFETY * abs(root.x[len(finer.state(root.x))] - value) + left)
-
-
-def _rest(problem: AbstractProblem, x: Array, p: Array) -> Rate:
-    return Rate.of_growth(problem.stored(x, p))

@@ -10,7 +10,7 @@ import numpy as np
 
 from shapespace.analysis.extended import Affine, ExtendedProblem
 from shapespace.base.arrays import Array
-from shapespace.base.problem import AbstractContinuableProblem, AbstractLinearisation, Rate
+from shapespace.base.problem import REST, AbstractContinuableProblem, AbstractLinearisation
 
 TANGENT_ERROR = 1e-4
 """Last correction of a tangent found with factors from nearby, in the norm of the problem; predictions need no better."""
@@ -92,7 +92,7 @@ class Direction(NamedTuple):
 
 
 def direction_at(
-    plane: ExtendedProblem, X: Array, p: Array, rate: Rate, nearby: AbstractLinearisation | None = None
+    plane: ExtendedProblem, X: Array, p: Array, nearby: AbstractLinearisation | None = None
 ) -> Direction | None:
     """The tangent at X across a plane, row . tangent = 1; None where the bordered Jacobian is singular.
 
@@ -103,7 +103,7 @@ def direction_at(
         found = _direction_nearby(plane, X, p, nearby)
         if found is not None:
             return found
-    _, linearisation = plane.linearise(X, p, rate)
+    _, linearisation = plane.linearise(X, p, REST)
     if linearisation.is_singular:
         return None
     response = linearisation.solve(_generic(len(X), 0))
@@ -202,5 +202,5 @@ def test_on(point: Point, problem: AbstractContinuableProblem) -> float:
         return there.test
     X = there.joined
     plane = orthogonal_plane(there, metric(problem, X) * there.tangent, X)
-    direction = direction_at(plane, X, there.p, Rate.of_growth(problem.stored(there.x, there.p)))
+    direction = direction_at(plane, X, there.p)
     return float("nan") if direction is None else direction.test

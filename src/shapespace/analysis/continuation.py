@@ -22,7 +22,7 @@ from shapespace.analysis.extended import AbstractMeasure, ExtendedProblem, Given
 from shapespace.analysis.stationary import STEP_NEWTON
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractContinuableProblem, Rate
+from shapespace.base.problem import REST, AbstractContinuableProblem
 from shapespace.numerics.newton import Newton, solve_root
 
 MEMORY = 4
@@ -92,17 +92,16 @@ def start_point(
     """
     point = Point(problem, x, p, index, np.append(np.zeros_like(x), 1.0), step=options.first, label="start")
     weights, X = metric(problem, point.joined, options.parameter_scale), point.joined
-    rate = Rate.of_growth(problem.stored(x, p))
     # At a fold no plane of constant parameter will do, but almost any other.
     generic = np.random.default_rng(0).standard_normal(len(X))
     for guess in (point.tangent, generic) if tangent is None else (tangent,):
         plane = orthogonal_plane(point, weights * guess, X)
-        found = direction_at(plane, X, p, rate)
+        found = direction_at(plane, X, p)
         if found is not None:
             unit = found.tangent / np.sqrt(weights @ found.tangent**2)
             turned = tangent is None and unit[-1] * direction < 0.0
             unit = -unit if turned else unit
-            again = direction_at(orthogonal_plane(point, weights * unit, X), X, p, rate)
+            again = direction_at(orthogonal_plane(point, weights * unit, X), X, p)
             return replace(point, tangent=unit, test=float("nan") if again is None else again.test)
     if tangent is None:
         return Outcome.SINGULAR
@@ -191,7 +190,6 @@ class _Trial:
         self.X = self.now.joined
         self.metric = metric(self.now.problem, self.X, options.parameter_scale)
         self.row = self.metric * self.now.tangent
-        self.rate = Rate.of_growth(self.now.problem.stored(self.now.x, self.now.p))
 
     def predicted(self, step: float) -> tuple[Array, int]:
         """X ahead, and the order of its error: by the cubic through an earlier point, or by the tangent."""
@@ -208,13 +206,13 @@ class _Trial:
         options = self.options
         guess, order = self.predicted(step)
         plane = orthogonal_plane(self.now, self.row, guess)
-        root = solve_root(plane, guess, self.now.p, self.rate, self.newton)
+        root = solve_root(plane, guess, self.now.p, REST, self.newton)
         if root.outcome is not Outcome.CONVERGED:
             return None
         error = plane.norm(root.x - guess, root.x) / options.prediction
         if error > WORST_MISS:
             return None
-        found = direction_at(plane, root.x, self.now.p, self.rate, root.linearisation)
+        found = direction_at(plane, root.x, self.now.p, root.linearisation)
         if found is None:
             return None
         point = self._point(plane, root.x, found)
@@ -267,7 +265,7 @@ class _Trial:
         cubic = hermite(self.X, now.tangent, end.joined, end.tangent, end.arclength - now.arclength)
         guess = np.asarray(polyval(s, cubic))
         fixed = ExtendedProblem(now.problem, (now.index,), (Given(stop.measure, stop.value),))
-        root = solve_root(fixed, guess, now.p, self.rate, self.newton)
+        root = solve_root(fixed, guess, now.p, REST, self.newton)
         if root.outcome is not Outcome.CONVERGED:
             return None
         X = root.x
@@ -275,7 +273,7 @@ class _Trial:
             return None
         if stop.measure == Parameter(now.index):
             X[-1] = stop.value
-        found = direction_at(orthogonal_plane(now, self.row, X), X, now.p, self.rate)
+        found = direction_at(orthogonal_plane(now, self.row, X), X, now.p)
         if found is None:
             return None
         point = self._point(fixed, X, found)

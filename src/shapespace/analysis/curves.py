@@ -25,7 +25,7 @@ from shapespace.analysis.passage import is_symmetric, point_between
 from shapespace.analysis.singular import Kernel, SingularProblem, probe
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 
 BRACKET = 1e-10
 """The search for a special point ends where its bracket is this part of the first one."""
@@ -132,7 +132,7 @@ def turning(point: Point) -> float:
     """The slope of the second parameter along the curve; NaN where the curve has no single direction."""
     X = point.joined
     plane = orthogonal_plane(point, metric(point.problem, X) * point.tangent, X)
-    found = direction_at(plane, X, point.p, _rest(point))
+    found = direction_at(plane, X, point.p)
     return float("nan") if found is None else float(found.tangent[-1])
 
 
@@ -140,7 +140,7 @@ def regularity(point: Point) -> float:
     """Zero where the curve's system is singular: the inverse size of a fixed solution, with the determinant's sign."""
     X = point.joined
     plane = orthogonal_plane(point, metric(point.problem, X) * point.tangent, X)
-    _, linearisation = plane.linearise(X, point.p, _rest(point))
+    _, linearisation = plane.linearise(X, point.p, REST)
     return linearisation.sign / float(np.linalg.norm(linearisation.solve(probe(len(X)))))
 
 
@@ -301,7 +301,3 @@ def _errors(before: Point, after: Point, function: Function, place: Point) -> tu
         moved = np.nan if other is None else np.array([own_parameter(other), other.parameter]) - values
         errors = errors + SAFETY * np.abs(moved)
     return float(errors[0]), float(errors[1])
-
-
-def _rest(point: Point) -> Rate:
-    return Rate.of_growth(point.problem.stored(point.x, point.p))

@@ -26,6 +26,7 @@ from shapespace.analysis.stationary import Stationary, solve_stationary
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import (
+    REST,
     AbstractContinuableProblem,
     AbstractLinearisation,
     AbstractProblem,
@@ -159,7 +160,7 @@ def is_same(one: Stationary, other: Stationary, newton: Newton = Newton()) -> bo
     for image in images(other, problem):
         if distance(problem, one.x, image) > NEAR:
             continue
-        root = solve_root(problem, image, one.p, Rate.of_growth(problem.stored(image, one.p)), newton)
+        root = solve_root(problem, image, one.p, REST, newton)
         if root.outcome is Outcome.CONVERGED and distance(problem, one.x, root.x) <= SAME:
             return True
     return False
@@ -208,9 +209,9 @@ def solve_deflated(
         if min(distance(problem, x, image) for image in images(one, problem)) <= SAME:
             return Trial(guess.name, replace(one, outcome=Outcome.REPEATED, iterations=0), number)
     deflated = DeflatedProblem.of(problem, known, options)
-    root = solve_root(deflated, x, p, Rate.of_growth(problem.stored(x, p)), search)
+    root = solve_root(deflated, x, p, REST, search)
     if root.outcome is not Outcome.CONVERGED:
-        residual = float(np.abs(problem.residual(root.x, p, Rate.of_growth(problem.stored(root.x, p)))).max())
+        residual = float(np.abs(problem.residual(root.x, p, REST)).max())
         found = Stationary(problem, root.x, p, root.outcome, root.correction, residual, root.iterations, False)
         return Trial(guess.name, found)
     found = solve_stationary(problem, root.x, p, newton)

@@ -10,7 +10,7 @@ from shapespace.analysis.bifurcation import SAFETY
 from shapespace.analysis.branch import Point, hermite, metric, orthogonal_plane
 from shapespace.analysis.stability import Spectrum
 from shapespace.base.arrays import Array
-from shapespace.base.problem import AbstractContinuableProblem, AbstractSmoothProblem, Rate
+from shapespace.base.problem import REST, AbstractContinuableProblem, AbstractSmoothProblem
 from shapespace.numerics.newton import Newton, solve_root
 
 PLACE = Newton(tolerance=1e-10)
@@ -45,8 +45,7 @@ def point_between(before: Point, after: Point, share: float) -> Point | None:
     weights = metric(problem, guess)
     tangent = along / np.sqrt(weights @ along**2)
     plane = orthogonal_plane(after, weights * tangent, guess)
-    rate = Rate.of_growth(problem.stored(after.x, after.p))
-    root = solve_root(plane, guess, after.p, rate, PLACE)
+    root = solve_root(plane, guess, after.p, REST, PLACE)
     if not root.outcome.is_success:
         return None
     x, p = plane.split(root.x, after.p)
@@ -92,10 +91,10 @@ def passed_start(start: Point, before: Point, after: Point) -> float | None:
     return float(last.arclength + share * length + ahead)
 
 
-def is_symmetric(problem: AbstractContinuableProblem, x: Array) -> bool:
-    """Whether a state is its own mirror image."""
+def is_symmetric(problem: AbstractContinuableProblem, x: Array) -> bool | None:
+    """Whether a state is its own mirror image; None where states have none."""
     image = problem.reflected(x) if isinstance(problem, AbstractSmoothProblem) else None
-    return image is not None and problem.norm(image - x, x) < MIRRORED
+    return None if image is None else problem.norm(image - x, x) < MIRRORED
 
 
 def meets_mirror_image(point: Point) -> bool:
@@ -173,7 +172,7 @@ def _error(point: Point, pair: complex, slope: float, of: SpectrumOf) -> float:
     finer, left = point.problem.refined(), abs(pair.real)
     if finer is not None:
         x = point.problem.carried(point.x, finer)
-        root = solve_root(finer, x, point.p, Rate.of_growth(finer.stored(x, point.p)), PLACE)
+        root = solve_root(finer, x, point.p, REST, PLACE)
         spectrum = of(replace(point, problem=finer, x=root.x))
         if not (root.outcome.is_success and spectrum.converged):
             return float("nan")

@@ -28,6 +28,7 @@ import numpy as np
 
 from shapespace.base.arrays import Array
 from shapespace.base.problem import (
+    REST,
     AbstractContinuableProblem,
     AbstractLinearisation,
     AbstractProblem,
@@ -93,7 +94,7 @@ class SingularProblem(AbstractContinuableProblem):
         out[self.index] = value
         return out
 
-    def _kernel(self, big_x: Array, p: Array, rate: Rate) -> Kernel:
+    def _kernel(self, big_x: Array, p: Array, rate: Rate = REST) -> Kernel:
         x, d = self.state(big_x), len(self.kernel)
         p = self.parameters(big_x, p)
         still = np.zeros_like(x)
@@ -132,7 +133,7 @@ class SingularProblem(AbstractContinuableProblem):
 
     def factors(self, big_x: Array, p: Array) -> Kernel:
         """M factorised at rest, with the kernel."""
-        return self._kernel(big_x, p, Rate.of_growth(self.stored(big_x, p)))
+        return self._kernel(big_x, p)
 
     def gradient(self, kernel: Kernel, big_x: Array, p: Array, dx: Array, dp: Array) -> Array:
         """g_i' (d,) along (dx, dp), dp being complete."""
@@ -161,7 +162,7 @@ class SingularProblem(AbstractContinuableProblem):
         """Along dX = (dx, dlambda[, dsigma]) and the other parameters dp."""
         state, full = self.state(x), self.parameters(x, p)
         inner, along = self.state(dx), self.parameters(dx, dp)
-        kernel = self._kernel(x, p, Rate.of_growth(self.base.stored(state, full)))
+        kernel = self._kernel(x, p)
         change = self.base.derivative(state, full, inner, along)
         if not self.is_fold:
             change = change + dx[-1] * self._unfolding(state, full)

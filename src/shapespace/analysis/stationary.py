@@ -6,7 +6,7 @@ import numpy as np
 
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractContinuableProblem, Rate
+from shapespace.base.problem import REST, AbstractContinuableProblem
 from shapespace.numerics.newton import Newton, solve_root
 
 STEP_NEWTON = Newton(max_iterations=12, min_damping=1.0 / 32.0)
@@ -39,13 +39,12 @@ def solve_stationary(
     """Solve F(x; p) = 0 from the guess x, moving to better discretisations of the problem, at most `max_moves` times."""
     iterations, moves = 0, 0
     while True:
-        rate = Rate.of_growth(problem.stored(x, p))
-        root = solve_root(problem, x, p, rate, newton)
+        root = solve_root(problem, x, p, REST, newton)
         iterations += root.iterations
         converged = root.outcome is Outcome.CONVERGED
         better = problem.adapted(root.x) if converged else problem
         if better is problem or moves == max_moves:
-            residual = float(np.abs(problem.residual(root.x, p, rate)).max())
+            residual = float(np.abs(problem.residual(root.x, p, REST)).max())
             settled = converged and better is problem
             return Stationary(problem, root.x, p, root.outcome, root.correction, residual, iterations, settled)
         assert isinstance(better, AbstractContinuableProblem)
@@ -84,7 +83,7 @@ def step_to(
 def _stepped(now: Stationary, p: Array, newton: Newton, largest_miss: float) -> Stationary | None:
     """The same state at parameters p nearby; None where Newton fails or ends far from the prediction."""
     problem, x = now.problem, now.x
-    _, linearisation = problem.linearise(x, now.p, Rate.of_growth(problem.stored(x, now.p)))
+    _, linearisation = problem.linearise(x, now.p, REST)
     if linearisation.is_singular:
         return None
     guess = x - linearisation.solve(problem.derivative(x, now.p, np.zeros_like(x), p - now.p))

@@ -18,7 +18,7 @@ from shapespace.analysis.deflation import is_same
 from shapespace.analysis.stationary import LARGEST_MISS, Stationary, step_to
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractContinuableProblem, AbstractLinearisation, AbstractSmoothProblem, Rate
+from shapespace.base.problem import REST, AbstractContinuableProblem, AbstractLinearisation, AbstractSmoothProblem
 from shapespace.numerics.newton import Newton, solve_root
 
 Index = tuple[int, int]
@@ -63,7 +63,6 @@ class Sweep:
     _tries: dict[Index, int] = field(default_factory=dict)
     _neighbours: dict[Index, int] = field(default_factory=dict)
     _factors: tuple[AbstractContinuableProblem, AbstractLinearisation] | None = None
-    _still: tuple[AbstractContinuableProblem, Rate] | None = None
 
     def p(self, at: Index) -> Array:
         """Parameters (m,) of a point."""
@@ -183,19 +182,12 @@ class Sweep:
         state = self.found[at]
         return state.x if state.problem is problem else state.problem.carried(state.x, problem)
 
-    def _rest(self, problem: AbstractContinuableProblem, x: Array, p: Array) -> Rate:
-        """No motion: no more than a vector of zeros, whose length the discretisation tells."""
-        if self._still is None or self._still[0] is not problem:
-            self._still = (problem, Rate.of_growth(problem.stored(x, p)))
-        return self._still[1]
-
     def _newton(self, problem: AbstractContinuableProblem, x: Array, p: Array) -> Stationary:
         """Newton's method with the last factors, on better discretisations where the first is not good enough."""
         iterations = 0
         for move in range(MAX_MOVES + 1):
-            rate = self._rest(problem, x, p)
             factors = self._factors[1] if self._factors is not None and self._factors[0] is problem else None
-            root = solve_root(problem, x, p, rate, self.newton, factors)
+            root = solve_root(problem, x, p, REST, self.newton, factors)
             iterations += root.iterations
             if root.linearisation is not None:
                 self._factors = (problem, root.linearisation)
@@ -228,7 +220,7 @@ def _is_beside(state: Stationary, other: Stationary) -> bool:
     there = other.x if other.problem is problem else other.problem.carried(other.x, problem)
     signs = []
     for x, p in ((state.x, state.p), (there, other.p)):
-        _, linearisation = problem.linearise(x, p, Rate.of_growth(problem.stored(x, p)))
+        _, linearisation = problem.linearise(x, p, REST)
         signs.append(linearisation.sign)
     return signs[0] == signs[1]
 

@@ -10,20 +10,26 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import numpy as np
+
 from shapespace.base.arrays import Array
 
 
 @dataclass(frozen=True)
 class Rate:
-    """dq/dt = coefficient q(x) + history. Shapes: history (n_q,). coefficient [1/time]."""
+    """dq/dt = coefficient q(x) + history. Shapes: history (n_q,) or (1,). coefficient [1/time]."""
 
     coefficient: float
     history: Array
 
     @classmethod
-    def of_growth(cls, stored: Array, growth: float = 0.0) -> "Rate":
+    def of_growth(cls, stored: Array, growth: float) -> "Rate":
         """dq/dt = growth (q(x) - stored): rest at a state with these stored quantities, where the Jacobian is J + growth B."""
         return cls(growth, -growth * stored)
+
+
+REST = Rate(0.0, np.zeros(1))
+"""dq/dt = 0, whatever q, which the history of one number fits by broadcasting."""
 
 
 @dataclass(frozen=True)

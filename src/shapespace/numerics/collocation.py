@@ -8,7 +8,15 @@ from typing import Any
 import numpy as np
 
 from shapespace.base.arrays import Array
-from shapespace.base.problem import AbstractLinearisation, AbstractProblem, AbstractSmoothProblem, Actions, Border, Rate
+from shapespace.base.problem import (
+    REST,
+    AbstractLinearisation,
+    AbstractProblem,
+    AbstractSmoothProblem,
+    Actions,
+    Border,
+    Rate,
+)
 from shapespace.numerics import condensation
 from shapespace.numerics.adaptation import adapted_mesh
 from shapespace.numerics.border import with_border
@@ -17,7 +25,7 @@ from shapespace.numerics.layout import assembled, by_element, joined, lay_out, p
 from shapespace.numerics.pointwise import Density, Functions, compiled_functions, numbers, points_per_tile
 from shapespace.numerics.small_lu import compiled, read_only
 from shapespace.numerics.state import State
-from shapespace.numerics.system import AbstractSystem
+from shapespace.numerics.system import AbstractSystem, Symmetry
 from shapespace.numerics.transposed import solve_transposed
 
 RELATIVE_FLOOR = 1.0
@@ -26,8 +34,6 @@ RELATIVE_FLOOR = 1.0
 Slopes = tuple[Array, Array]
 """Derivatives by x (size,) and by p (n_p,)."""
 
-REST = Rate(0.0, np.zeros(0))
-"""dq/dt = 0, whatever q."""
 FAST = 2.0**20
 """A rate of growth at which the mass stands out of the Jacobian's round-off."""
 
@@ -241,21 +247,25 @@ class CollocationProblem(AbstractSmoothProblem):
 
     def integrals(self, density: Density, x: Array, p: Array, rate: Rate) -> tuple[dict[str, float], dict[str, float]]:
         """Gauss quadrature of density(system, dy, y, a, s, dq, p) over u, by name, and the largest point values."""
-        parts = [self.functions.densities(density, tile) for tile in self._tiles(x, p, rate)]
-        values = {name: joined([part[name] for part in parts], self._points) for name in parts[0]}
-        sums = {name: float(self._shares @ value) for name, value in values.items()}
-        return sums, {name: float(value.max()) for name, value in values.items()}
+        names, values = self._densities(density, self._tiles(x, p, rate))
+        sums, peaks = (values @ self._shares).tolist(), values.max(axis=1).tolist()
+        return dict(zip(names, sums, strict=True)), dict(zip(names, peaks, strict=True))
+
+    def _densities(self, density: Density, tiles: Array) -> tuple[list[str], Array]:
+        """Names, and values (names, k N) at the points."""
+        parts = [self.functions.densities(density, tile) for tile in tiles]
+        (names,) = parts[0]
+        return names.split(), joined([part[names] for part in parts], self._points)
 
     def integral_slopes(self, density: Density, x: Array, p: Array) -> tuple[dict[str, Slopes], dict[str, Slopes]]:
         """Derivatives by x and p of what `integrals` returns, at rest; a largest value stays that of its point."""
         tiles = self._tiles(x, p)
         parts = [self.functions.density_slopes(density, tile) for tile in tiles]
-        values = [self.functions.densities(density, tile) for tile in tiles]
         sums, peaks = dict[str, Slopes](), dict[str, Slopes]()
-        for name in parts[0]:
+        for name, values in zip(*self._densities(density, tiles), strict=True):
             slopes = [joined(list(by), self._points) for by in zip(*(part[name] for part in parts), strict=True)]
             largest = np.zeros(self._points)
-            largest[int(joined([value[name] for value in values], self._points).argmax())] = 1.0
+            largest[int(values.argmax())] = 1.0
             sums[name], peaks[name] = self._gathered(slopes, self._shares), self._gathered(slopes, largest)
         return sums, peaks
 
@@ -321,9 +331,13 @@ class CollocationProblem(AbstractSmoothProblem):
         """On a mesh with every element halved."""
         return self.on_mesh(np.sort(np.concatenate([self.mesh, 0.5 * (self.mesh[1:] + self.mesh[:-1])])))
 
+    @cached_property
+    def _symmetry(self) -> Symmetry | None:
+        return self.system.symmetry
+
     def reflected(self, x: Array, increment: bool = False) -> Array | None:
         """The mirror image of a state, or of an increment, under the system's symmetry."""
-        symmetry = self.system.symmetry
+        symmetry = self._symmetry
         if symmetry is None:
             return None
         return self.pack(self.unpack(x).reflected(symmetry, increment).on_mesh(self.mesh))

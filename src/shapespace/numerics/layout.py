@@ -19,7 +19,7 @@ from shapespace.numerics.small_lu import Array, compiled, put
 
 @compiled
 def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, points_per_tile):  # type: ignore[no-untyped-def]  # numba finds the types
-    """Tiles (n_tiles, size) of x and all else that they hold; history (N k + 2, n_q), flat, or empty for zero. Linear in x.
+    """Tiles (n_tiles, size) of x and all else that they hold; history (N k + 2, n_q), flat, or (1,) for zero. Linear in x.
 
     stages (k,): the Gauss points on [0, 1]; matrix (k, k): integrals of their basis. Points beyond the last repeat it.
     """
@@ -28,7 +28,7 @@ def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, point
     algebraic = slopes + elements * k * n
     scalars = algebraic + elements * k * n_a
     n_s, n_p = x.shape[0] - scalars, p.shape[0]
-    n_points, moves = elements * k, history.shape[0] > 0
+    n_points, moves = elements * k, history.shape[0] > 1
     n_tiles = (n_points + size - 1) // size
     columns = 2 * n + n_a + n_q + 1
     first_ends = columns * size

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,26 @@ from shapespace.numerics.system import Symmetry
 
 MESH_ROUND_OFF = 1e-15
 """Meshes on [0, 1] that differ by no more are the same."""
+
+
+def _located(mesh: Array, u: Array) -> tuple[NDArray[np.intp], Array]:
+    """The elements of u (m,), and its place in each from 0 to 1."""
+    element = np.searchsorted(mesh[1:-1], u, side="right")
+    return element, (u - mesh[element]) / (mesh[element + 1] - mesh[element])
+
+
+class Places(NamedTuple):
+    """Points u (m,) of a mesh made ready for many states: their elements (m,), and weights (m, k) of the slopes there."""
+
+    u: Array
+    element: NDArray[np.intp]
+    weights: Array
+
+    @classmethod
+    def on(cls, mesh: Array, rule: GaussRule, u: Array) -> "Places":
+        """Points u (m,) of a mesh (N + 1,)."""
+        element, x = _located(mesh, u)
+        return cls(u, element, rule.basis_integral(x) * (mesh[element + 1] - mesh[element])[:, None])
 
 
 @dataclass(frozen=True)
@@ -45,8 +66,7 @@ class State:
         return np.asarray(self.nodes[:-1, None] + self.widths[:, None, None] * increments)
 
     def _locate(self, u: Array) -> tuple[NDArray[np.intp], Array]:
-        element = np.searchsorted(self.mesh[1:-1], u, side="right")
-        return element, (u - self.mesh[element]) / self.widths[element]
+        return _located(self.mesh, u)
 
     def place(self, u: float) -> tuple[int, float]:
         """The element of u, and u's place in it from 0 to 1."""
@@ -59,11 +79,12 @@ class State:
         weights = self.rule.basis_integral(x) * self.widths[element][:, None]
         return np.asarray(self.nodes[element] + np.einsum("ml,mln->mn", weights, self.slopes[element]))
 
-    def field(self, column: int, u: Array) -> Array:
+    def field(self, column: int, u: "Array | Places") -> Array:
         """One differential field at u (m,), as `values` has it."""
-        element, x = self._locate(u)
-        weights = self.rule.basis_integral(x) * self.widths[element][:, None]
-        return np.asarray(self.nodes[element, column] + (weights * self.slopes[element, :, column]).sum(axis=1))
+        at = u if isinstance(u, Places) else Places.on(self.mesh, self.rule, u)
+        return np.asarray(
+            self.nodes[at.element, column] + (at.weights * self.slopes[at.element, :, column]).sum(axis=1)
+        )
 
     def derivatives(self, u: Array) -> Array:
         """d/du of the differential fields at u (m,), shape (m, n); error of order k."""

@@ -1,6 +1,7 @@
 """Observables of a state, by their contract names, dimensionless."""
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from shapespace.base.problem import Rate
 from shapespace.geometry.contact import crosses_itself
 from shapespace.numerics.adaptation import discretisation_error
 from shapespace.numerics.collocation import CollocationProblem
-from shapespace.numerics.state import State
+from shapespace.numerics.gauss import gauss_rule
+from shapespace.numerics.state import Places, State
 from shapespace.physics.term import CHANNELS
 from shapespace.study.engine import Engine
 from shapespace.variational.ledger import boundary_power, densities
@@ -19,8 +21,8 @@ from shapespace.variational.surface import SurfaceSystem
 
 CLOSING_RADIUS = 1e-4
 """A neck thinner than this, in units of the surface's length scale, counts as closed."""
-OUTLINE = 6
-"""Segments of an outline per element, to see where it crosses itself."""
+SAMPLES_PER_ELEMENT = 6
+"""Where extrema are looked for, and where an outline may cross itself."""
 DISSIPATIONS = tuple(channel.value for channel in CHANNELS)
 """The channels of the dissipation, of which a model has some."""
 SUPPLIES = ("force_power", "boundary_power", "chemical_power")
@@ -37,7 +39,6 @@ FLOWS = (
 """What belongs to the motion of a surface, not to its shape: not known of a state that is given."""
 PEAKS = ("curvature",)
 """Densities whose largest point value is an observable, not their integral."""
-_SAMPLES_PER_ELEMENT = 4
 _ZOOMS, _ZOOM = 3, 64
 """Each narrows the place of an extremum to two of so many parts; its value then is exact to round-off."""
 
@@ -149,11 +150,18 @@ def _regulated(system: SurfaceSystem, parts: Mapping[str, Any], p: Any) -> dict[
     return {"tension_pole": v["tension"] + v["active_tension"] * hill, **{name: parts[name] for name in names}}
 
 
-def _samples(state: State) -> Array:
-    """Points (m,) that resolve the state: a few per element, and u = 1/2."""
-    fractions = np.arange(_SAMPLES_PER_ELEMENT) / _SAMPLES_PER_ELEMENT
-    points = state.mesh[:-1, None] + state.widths[:, None] * fractions
-    return np.union1d(np.append(points.ravel(), 1.0), [0.5])
+def _samples(state: State) -> Places:
+    """Points that resolve the state: a few per element, and u = 1/2."""
+    return _sampled(state.mesh.tobytes(), state.rule.degree)
+
+
+@lru_cache(maxsize=64)
+def _sampled(nodes: bytes, degree: int) -> Places:
+    """The points of a mesh, which many states share."""
+    mesh = np.frombuffer(nodes)
+    fractions = np.arange(SAMPLES_PER_ELEMENT) / SAMPLES_PER_ELEMENT
+    points = mesh[:-1, None] + np.diff(mesh)[:, None] * fractions
+    return Places.on(mesh, gauss_rule(degree), np.union1d(np.append(points.ravel(), 1.0), [0.5]))
 
 
 def neck_radius(state: State, r: int) -> float | None:
@@ -164,8 +172,8 @@ def neck_radius(state: State, r: int) -> float | None:
 
 def neck(state: State, r: int) -> tuple[float, float] | None:
     """Where r(u) has its smallest interior local minimum, and its value there; None without one."""
-    u = _samples(state)
-    values = state.field(r, u)
+    places = _samples(state)
+    values, u = state.field(r, places), places.u
     inner = np.flatnonzero((values[1:-1] < values[:-2]) & (values[1:-1] <= values[2:])) + 1
     found = [_largest_between(state, r, -1.0, u[i - 1], u[i + 1]) for i in inner]
     return min(((place, -value) for place, value in found), key=lambda one: one[1], default=None)
@@ -178,26 +186,21 @@ def shape_end(problem: CollocationProblem, x: Array) -> Outcome | None:
     neck = neck_radius(state, r)
     if neck is not None and neck < CLOSING_RADIUS:
         return Outcome.NECK_CLOSED
-    places = np.arange(OUTLINE * problem.elements + 1) / OUTLINE
-    u = np.interp(places, np.arange(problem.elements + 1), state.mesh)
-    z = fields.index("z")
-
-    def outline(u: Array) -> tuple[Array, Array]:
-        return state.field(r, u), state.field(z, u)
-
-    radii, heights = outline(u)
+    z, samples = fields.index("z"), _samples(state)
+    radii, heights = state.field(r, samples), state.field(z, samples)
     # An outline on its side of the axis cannot cross itself where it only falls, or turns only one way around a point.
     middle = 0.5 * (heights[0] + heights[-1])
     turns = radii[1:] * (heights[:-1] - middle) - radii[:-1] * (heights[1:] - middle)
     if radii[1:-1].min() > 0.0 and ((np.diff(heights) < 0.0).all() or (turns > 0.0).all()):
         return None
-    return Outcome.SELF_INTERSECTING if crosses_itself(outline, u) else None
+    crosses = crosses_itself(lambda u: (state.field(r, u), state.field(z, u)), samples.u)
+    return Outcome.SELF_INTERSECTING if crosses else None
 
 
 def largest_value(state: State, field: int) -> tuple[float, float]:
     """Where a field is largest, and its value there; a uniform field has its largest value in the middle."""
-    u = _samples(state)
-    values = state.field(field, u)
+    places = _samples(state)
+    values, u = state.field(field, places), places.u
     top = float(values.max())
     if top - float(values.min()) <= 1e-12 * max(abs(top), 1.0):
         return 0.5, top

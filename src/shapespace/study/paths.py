@@ -10,7 +10,7 @@ from shapespace.analysis.extended import Parameter
 from shapespace.analysis.stationary import Stationary, solve_stationary
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 from shapespace.numerics.newton import Newton
 
 NEWTON = Newton(tolerance=1e-10)
@@ -66,6 +66,5 @@ def along(first: Point, value: float, options: Arclength, away: float | None = N
 
 def given_up(last: Point, outcome: Outcome) -> Stationary:
     """The record of a way that ended at a point without the state that was looked for."""
-    still = Rate.of_growth(last.problem.stored(last.x, last.p))
-    residual = float(np.abs(last.problem.residual(last.x, last.p, still)).max())
+    residual = float(np.abs(last.problem.residual(last.x, last.p, REST)).max())
     return Stationary(last.problem, last.x, last.p, outcome, np.nan, residual, 0, False)

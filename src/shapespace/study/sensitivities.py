@@ -19,7 +19,7 @@ import numpy as np
 
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 from shapespace.numerics.collocation import CollocationLinearisation, CollocationProblem
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine
@@ -94,7 +94,7 @@ class Sensitivities:
     @cached_property
     def _linearisation(self) -> CollocationLinearisation:
         problem, p = self.engine.problem, self.engine.p
-        _, found = problem.linearise(self.x, p, Rate.of_growth(problem.stored(self.x, p)))
+        _, found = problem.linearise(self.x, p, REST)
         if found.is_singular:
             raise InputError(
                 "this state is a fold or branch point: it has no derivative by parameters; choose another."
@@ -111,7 +111,7 @@ class Sensitivities:
     def _parts(self) -> dict[str, Any]:
         """What the observables are combined from, as `observables.measure` does."""
         problem, p = self.engine.problem, self.engine.p
-        integrals, peaks = problem.integrals(densities, self.x, p, Rate.of_growth(problem.stored(self.x, p)))
+        integrals, peaks = problem.integrals(densities, self.x, p, REST)
         read = readings(self.engine.system, problem.unpack(self.x))
         parts = integrals | {name: peaks[name] for name in PEAKS} | read
         return {name: jnp.asarray(value) for name, value in parts.items()}

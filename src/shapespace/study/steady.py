@@ -17,7 +17,7 @@ from shapespace.analysis.tracing import Located, side_branches, traced
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, frame_of, state_of
@@ -174,7 +174,7 @@ class Steady(Presented):
 def observables_at(scenario: Scenario, problem: CollocationProblem, x: Array) -> dict[str, float]:
     """Observables of a state of the scenario at rest, in its units."""
     engine = replace(Engine.of(scenario), problem=problem)
-    values = measure(engine, x, Rate.of_growth(problem.stored(x, engine.p)))
+    values = measure(engine, x, REST)
     values |= energy_law(values, 0.0)
     return {name: value * scenario.scales.factor(name) for name, value in values.items()}
 
@@ -240,7 +240,7 @@ def _singular_at(scenario: Scenario, start: Start) -> Steady | None:
     if not root.outcome.is_success:
         return None
     x, p = root.x[: len(x)], root.x[len(x) : len(x) + 1]
-    residual = float(np.abs(problem.residual(x, p, Rate.of_growth(problem.stored(x, p)))).max())
+    residual = float(np.abs(problem.residual(x, p, REST)).max())
     settled = problem.adapted(x) is problem
     return _steady(
         scenario, Stationary(problem, x, p, root.outcome, root.correction, residual, root.iterations, settled)

@@ -15,7 +15,7 @@ from shapespace.analysis.stationary import Stationary
 from shapespace.analysis.sweeping import SIDES, Index, Sweep
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import Rate
+from shapespace.base.problem import REST
 from shapespace.study.diagram_store import (
     ABOUT_SOLUTION,
     CODES,
@@ -323,8 +323,7 @@ class Surveyor:
             count = spectrum.n_unstable
             values[UNSTABLE] = np.nan if count is None else count
         if end is None:
-            has_image = problem.reflected(state.x) is not None
-            out[REGIME][at] = regime_of(is_symmetric(problem, state.x) if has_image else None, measured, count)
+            out[REGIME][at] = regime_of(is_symmetric(problem, state.x), measured, count)
         out[OUTCOME][at] = CODES[end or Outcome.CONVERGED]
         for name, value in values.items():
             out[name][at] = value
@@ -346,7 +345,7 @@ class Surveyor:
         p = state.problem.powers.value(state.p)
         values = self._engine.values | dict(zip(self._engine.system.parameters, p.tolist(), strict=True))
         engine = replace(self._engine, problem=problem, p=p, values=values)
-        return measure(engine, state.x, Rate.of_growth(problem.stored(state.x, p)))
+        return measure(engine, state.x, REST)
 
     def _in_units(self, state: Stationary, measured: dict[str, float]) -> dict[str, float]:
         """In the scenario's units."""
@@ -363,5 +362,5 @@ def observable_names(scenario: Scenario, keys: tuple[str, str]) -> list[str]:
     """What the scenario's states report; a key that is an observable as well stands for itself."""
     engine = Engine.of(scenario)
     x = engine.problem.pack(engine.initial_state())
-    values = measure(engine, x, Rate.of_growth(engine.problem.stored(x, engine.p)))
+    values = measure(engine, x, REST)
     return [name for name in dict.fromkeys((*values, "neck_radius")) if name not in keys]
