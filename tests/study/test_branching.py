@@ -82,18 +82,39 @@ def test_the_swimmer_leaves_to_both_sides(sides: list[ss.Branch]):
     )
 
 
-def test_every_stored_point_is_found_again(store: Path):
-    found = ss.open_branch(store)
+def assert_found_again(path: Path) -> None:
+    """Each stored point converges in one or two steps."""
+    found = ss.open_branch(path)
     for point in found.points:
+        if point.kind in ("fold", "pitchfork"):  # where the Jacobian at a fixed parameter is singular
+            assert ss.steady(found.scenario_at(point), start=f"{path}:{point.label}").found.iterations <= 2
+            continue
         engine = Engine.of(found.scenario_at(point))
         problem, x = engine.placed(state_of(point.frame))
-        rest = REST
-        if point.kind == "pitchfork":  # where the Jacobian at a fixed parameter is singular
-            assert ss.steady(found.scenario_at(point), start=f"{store}:{point.label}").found.iterations <= 2
-            continue
-        root = solve_root(problem, x, engine.p, rest, NEWTON)
+        root = solve_root(problem, x, engine.p, REST, NEWTON)
         assert root.outcome is Outcome.CONVERGED
-        assert root.iterations <= 2
+        assert root.iterations <= 2, point
+
+
+def test_every_stored_point_is_found_again(store: Path):
+    assert_found_again(store)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("case", "key", "start", "stop", "state"),
+    [
+        (ss.scenario("membrane-protrusion"), "spontaneous_curvature", 0.0, 14.0, "trivial"),
+        (ss.scenario("guided-division"), "ring_amplitude", 0.0, 4.2, "default"),
+        (ss.scenario("vesicle"), "reduced_volume", 0.95, 0.6, "prolate"),
+    ],
+    ids=["fig-3a", "fig-7b", "prolate"],
+)
+def test_every_point_of_a_whole_branch_is_found_again(
+    case: ss.Scenario, key: str, start: float, stop: float, state: str, tmp_path: Path
+):
+    ss.branch(case, key, stop, start=start, state=state, stability=False, out=tmp_path / "branch")
+    assert_found_again(tmp_path / "branch")
 
 
 def test_singular_points_are_states_at_rest_again(tmp_path: Path):

@@ -160,6 +160,9 @@ def hermite(start: Array, start_slope: Array, end: Array, end_slope: Array, leng
 
 def real_roots(coefficients: Array, start: float, end: float) -> Array:
     """The real roots of a polynomial, coefficients in rising powers, in (start, end], in rising order."""
+    reach = max(abs(start), abs(end)) ** np.arange(1, len(coefficients))
+    if abs(coefficients[0]) > np.abs(coefficients[1:]) @ reach:
+        return np.zeros(0)
     kept = np.trim_zeros(coefficients, "b")
     roots = np.polynomial.polynomial.polyroots(kept) if len(kept) > 1 else np.zeros(0)
     real = np.sort(roots.real[np.abs(roots.imag) <= 1e-9 * (end - start)])

@@ -206,23 +206,45 @@ def factorise(
 
 def determinant_sign(factors: Factors) -> float:
     """Sign of the determinant of the whole matrix, up to a factor that depends on N, k and the numbers of rows only."""
-    f, size = factors, len(factors.plan.position)
-    elements, m, n = len(f.widths), len(f.plan.partner), f.chain_pivot.shape[1]
-    pivots = [
-        f.local.dense[:, :size, :size].diagonal(axis1=1, axis2=2),
-        f.chain[:, :n, :n].diagonal(axis1=1, axis2=2),
-        f.border_lu.diagonal(),
-    ]
-    stages = f.local.work[:size]
-    odd = np.count_nonzero(stages < 0.0) - np.count_nonzero(stages[:, f.local.pivoted] < 0.0)
-    odd += sum(np.count_nonzero(part < 0.0) for part in pivots)
-    odd += sum(
-        np.count_nonzero(e != np.arange(e.shape[-1])) for e in (f.local.exchanges, f.chain_pivot, f.border_pivot)
-    )
-    matching = sum(np.count_nonzero(f.plan.partner[:i] > f.plan.partner[i]) for i in range(m))
-    odd += matching * (size // m * elements)
-    regular = not f.singular and all((part != 0.0).all() for part in pivots)
-    return (-1.0) ** (odd % 2) if regular else 0.0
+    f, plan, local = factors, factors.plan, factors.local
+    if f.singular:
+        return 0.0
+    matching = sum(np.count_nonzero(plan.partner[:i] > plan.partner[i]) for i in range(len(plan.partner)))
+    sign = (-1.0) ** (matching * (len(plan.position) // len(plan.partner) * len(f.widths)) % 2)
+    sign *= _signs_of_stages(local.work[: len(plan.position)], local.pivoted)
+    for lu, exchanges in (
+        (local.dense, local.exchanges),
+        (f.chain, f.chain_pivot),
+        (f.border_lu[None], f.border_pivot[None]),
+    ):
+        sign *= _signs_of_pivots(lu, exchanges)
+    return float(sign)
+
+
+@compiled
+def _signs_of_stages(pivots, others):  # type: ignore[no-untyped-def]  # numba finds the types
+    """Product of the signs of pivots (k m, N), but for those of other elements (M,)."""
+    sign = 1.0
+    for i in range(pivots.shape[0]):
+        for value in pivots[i]:
+            if value < 0.0:
+                sign = -sign
+        for e in others:
+            if pivots[i, e] < 0.0:
+                sign = -sign
+    return sign
+
+
+@compiled
+def _signs_of_pivots(lu, exchanges):  # type: ignore[no-untyped-def]  # numba finds the types
+    """Product of the signs of determinants from their LU (M, rows, columns) and exchanges (M, pivots)."""
+    sign = 1.0
+    for index in range(exchanges.shape[0]):
+        for j in range(exchanges.shape[1]):
+            sign *= np.sign(lu[index, j, j])
+            if exchanges[index, j] != j:
+                sign = -sign
+    return sign
 
 
 @compiled

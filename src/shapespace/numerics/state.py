@@ -101,12 +101,12 @@ class State:
         if mesh.shape == self.mesh.shape and np.array_equal(mesh, self.mesh):
             return self
         widths, k = np.diff(mesh), self.rule.degree
-        points = (mesh[:-1, None] + widths[:, None] * self.rule.points).ravel()
-        slopes = self.derivatives(points).reshape(len(widths), k, -1)
-        nodes = self.values(mesh)
+        element, x = self._locate((mesh[:-1, None] + widths[:, None] * self.rule.points).ravel())
+        basis, nodes = self.rule.basis(x), self.values(mesh)
+        slopes = np.einsum("ml,mln->mn", basis, self.slopes[element]).reshape(len(widths), k, -1)
+        algebraic = np.einsum("ml,mln->mn", basis, self.algebraic[element]).reshape(len(widths), k, -1)
         # Slopes sampled from a kinked polynomial miss the increment a little; shift them so that elements stay continuous.
         missing = np.diff(nodes, axis=0) / widths[:, None] - np.einsum("l,eln->en", self.rule.weights, slopes)
-        algebraic = self.algebraic_values(points).reshape(len(widths), k, -1)
         return State(mesh, nodes, slopes + missing[:, None], algebraic, self.scalars.copy())
 
     def reflected(self, symmetry: Symmetry, increment: bool = False) -> "State":

@@ -4,6 +4,8 @@ import math
 from collections import deque
 from time import monotonic
 
+import numpy as np
+
 from shapespace.study.frame import Frame
 
 # The radius that tells most, then the height.
@@ -11,10 +13,12 @@ _RADII = ("neck_radius", "equator_radius")
 
 # An estimate beyond this many seconds comes from the first tiny steps and says nothing.
 _LONGEST = 24 * 3600
+# Steps that grow by less than this part at a time have one size.
+_STEADY = 1e-3
 
 
 class Pace:
-    """The speed of the last frames, in scenario time per second of the clock; adaptive steps make it vary."""
+    """The speed of the last frames, in steps per second of the clock, and how their steps have grown."""
 
     def __init__(self, until: float) -> None:
         self.until = until
@@ -30,9 +34,16 @@ class Pace:
 
     def _eta(self) -> str:
         # The oldest mark is left out: before the second frame there was compilation.
-        (begin, first), (now, time) = self._marks[min(1, len(self._marks) - 1)], self._marks[-1]
-        seconds = max(0.0, self.until - time) * (now - begin) / (time - first) if time > first else math.inf
-        if seconds > _LONGEST:
+        clocks, times = np.array(list(self._marks)[1:]).reshape(-1, 2).T
+        steps = np.diff(times)
+        if not len(steps) or steps.min() <= 0.0:
+            return "ETA unknown"
+        # Steps that have grown are taken to grow on by the same factor: then their number rises with the logarithm of the time.
+        growth = float(np.log(steps[-1] / steps[0])) / max(len(steps) - 1, 1)
+        left = max(0.0, self.until - float(times[-1])) / float(steps[-1])
+        count = math.log1p(left * math.expm1(growth) * math.exp(-growth)) / growth if growth > _STEADY else left
+        seconds = count * float(clocks[-1] - clocks[0]) / len(steps)
+        if not seconds <= _LONGEST:
             return "ETA unknown"
         minutes, seconds = divmod(round(seconds), 60)
         return f"ETA {minutes} min {seconds} s" if minutes else f"ETA {seconds} s"
