@@ -307,12 +307,12 @@ def test_help_loads_no_numerical_library():
 def test_pictures_and_export_go_where_they_are_wanted(shell: Shell, monkeypatch: pytest.MonkeyPatch):
     dataset_module = pytest.importorskip("shapespace.study.dataset")
     figure_module = pytest.importorskip("shapespace.view.figure")
-    movie_module = pytest.importorskip("shapespace.view.movie")
+    show_module = pytest.importorskip("shapespace.view.show")
     dataset = xr.Dataset({"height": ("time", [1.0, 2.0])})
     for module in (dataset_module, pytest.importorskip("shapespace.study.tables")):
         monkeypatch.setattr(module, "open_dataset", lambda _: dataset)
     monkeypatch.setattr(figure_module, "plot_run", lambda _: Figure())
-    monkeypatch.setattr(movie_module, "save_movie", lambda _data, path, _progress: path)
+    monkeypatch.setattr(show_module, "movie", lambda _store, path, _progress: path)
     Path("run").mkdir()
     assert shell("plot", "run") == (0, "run/figure.png\n", "")
     assert shell("plot", "run", "--out", "a.pdf") == (0, "a.pdf\n", "")

@@ -36,10 +36,14 @@ ROUGH = 0.1
 
 @dataclass(frozen=True)
 class Spectral:
-    """Options. count: leading rates wanted. accuracy: of the state, relative; rates that it may shift to zero are neutral."""
+    """Options. count: leading rates wanted. accuracy: of the modes; state_error: of the state, where it is known to be larger.
+
+    Rates that these, both relative, may shift to zero are neutral.
+    """
 
     count: int = 6
     accuracy: float = 1e-9
+    state_error: float = 0.0
     max_dimension: int = 120
     max_attempts: int = 6
 
@@ -225,7 +229,7 @@ class _Search:
                 if defects[i] <= self.options.accuracy:
                     break
             modes[i] *= _phase(modes[i]) / np.sqrt(self.problem.weights(self.x) @ np.abs(modes[i]) ** 2)
-        accuracy = np.maximum(ritz.residuals[: ritz.settled], self.options.accuracy)
+        accuracy = np.maximum(ritz.residuals[: ritz.settled], max(self.options.accuracy, self.options.state_error))
         accuracy[leading] = np.maximum(accuracy[leading], defects)
         errors = np.abs(pencil.shift - rates) * krylov.conditions(ritz)[: ritz.settled] * accuracy
         return _Pairs(disc, rates, errors, leading, modes, defects)

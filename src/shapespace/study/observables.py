@@ -145,9 +145,14 @@ def _regulated(system: SurfaceSystem, parts: Mapping[str, Any], p: Any) -> dict[
     """Observables that only a surface with a regulator has."""
     v = dict(zip(system.parameters, p, strict=True))
     c_pole = parts["first"][system.fields.index("c")]
-    hill = c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2)
-    names = ("max_concentration", "ring_position", "chemical_power", "amount", "amount_supply")
-    return {"tension_pole": v["tension"] + v["active_tension"] * hill, **{name: parts[name] for name in names}}
+    out = {
+        name: parts[name]
+        for name in ("max_concentration", "ring_position", "chemical_power", "amount", "amount_supply")
+    }
+    if "active_tension" in v:
+        hill = c_pole**2 / (c_pole**2 + v["saturation_concentration"] ** 2)
+        out["tension_pole"] = v["tension"] + v["active_tension"] * hill
+    return out
 
 
 def _samples(state: State) -> Places:

@@ -12,11 +12,17 @@ AMOUNT = "regulator-amount"
 
 
 def spectrum_at(
-    problem: KeyedProblem | HeldProblem, x: Array, p: Array, *, count: int = 6, near: Spectrum | None = None
+    problem: KeyedProblem | HeldProblem,
+    x: Array,
+    p: Array,
+    *,
+    count: int = 6,
+    near: Spectrum | None = None,
+    state_error: float = 0.0,
 ) -> Spectrum:
     """Leading growth rates and modes, dimensionless, with the neutral ones of conservation laws by name."""
     conserved = _conserved(problem, x, p) if isinstance(problem, KeyedProblem) else {}
-    return solve_spectrum(problem, x, p, Spectral(count=count), near=near, conserved=conserved)
+    return solve_spectrum(problem, x, p, Spectral(count=count, state_error=state_error), near=near, conserved=conserved)
 
 
 def _conserved(problem: KeyedProblem, x: Array, p: Array) -> dict[str, Array]:

@@ -105,7 +105,9 @@ class Steady(Presented):
 
     def spectrum(self, count: int = 6) -> Spectrum:
         """Leading growth rates and modes, dimensionless."""
-        return spectrum_at(self.problem, self.found.x, self.found.p, count=count)
+        found = self.found
+        # At a branch point Newton's method ends by round-off far from the state, and its rate is known no better.
+        return spectrum_at(self.problem, found.x, found.p, count=count, state_error=found.correction)
 
     def rates(self, count: int = 6) -> Rates:
         """Leading growth rates in the scenario's units."""
