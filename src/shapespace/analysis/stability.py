@@ -302,8 +302,9 @@ def _lowest_shift(leading: ComplexArray) -> float:
 
 
 def _shift_by(ritz: Ritz) -> float:
-    """A shift by the first of the rates, known roughly."""
-    rough = ritz.rates[ritz.residuals < ROUGH] if (ritz.residuals < ROUGH).any() else ritz.rates
+    """A shift by the first of the rates, known roughly; round-off leaves others beyond all that are looked for."""
+    is_rough = (ritz.residuals < ROUGH) & (np.abs(ritz.rates) <= FARTHEST)
+    rough = ritz.rates[is_rough] if is_rough.any() else ritz.rates
     first = rough[_leading(rough, 3)]
     return max(1.2 * _lowest_shift(first), 0.5 * float(np.abs(first).max(initial=0.0)))
 
