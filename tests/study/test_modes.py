@@ -54,8 +54,10 @@ def test_without_turnover_the_amount_of_regulator_is_neutral(sphere: Steady):
     assert neutral_modes(sphere.scenario, spectrum.neutral) == [HELD, {"name": AMOUNT, "index": place}]
 
 
-def test_at_the_pitchfork_the_polar_mode_is_critical():
-    steady = ss.steady(ss.scenario("polar-swimmer", elements=20, peclet=22.0), state="trivial")
+def test_at_the_pitchfork_the_polar_mode_is_critical(tmp_path: Path):
+    case = ss.scenario("polar-swimmer", elements=20)
+    found = ss.branch(case, "peclet", 22.5, start=21.5, state="trivial", stability=False, out=tmp_path / "sphere")
+    steady = ss.steady(found.scenario_at(found["pitchfork-1"]), start=f"{tmp_path / 'sphere'}:pitchfork-1")
     rates = steady.rates()
     assert neutral_modes(steady.scenario, rates.neutral) == [HELD, {"name": CRITICAL, "index": 0}]
     assert (rates.parities[0], rates.n_unstable) == ("antisymmetric", 0)
