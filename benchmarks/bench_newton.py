@@ -17,8 +17,9 @@ from shapespace.base.arrays import Array
 from shapespace.base.problem import Rate
 from shapespace.numerics import condensation
 from shapespace.numerics.collocation import CollocationProblem
-from shapespace.numerics.elimination import eliminate_stages, make_plan
+from shapespace.numerics.elimination import eliminate_stages
 from shapespace.numerics.gauss import gauss_rule
+from shapespace.numerics.plan import make_plan
 from shapespace.study.engine import Engine
 from shapespace.study.scenario import scenario
 

@@ -23,6 +23,7 @@ from shapespace.study.branch_point import BranchPoint
 from shapespace.study.dataset import profile_of
 from shapespace.study.starts import Start
 from shapespace.view import style
+from shapespace.view.figure import plot_run
 from shapespace.view.outline import draw_outline
 
 COLOURS = (style.BLUE, style.ORANGE, style.PURPLE, style.GREEN, style.RED)
@@ -96,10 +97,14 @@ def resumed_branch(
     return found
 
 
-def settled_run(out: Path, scenario: ss.Scenario, quick: bool) -> tuple[ss.Run, ss.Steady]:
-    """A run to its end, in a store where an earlier call may have finished it, and the stationary state next to that end."""
+def settled_run(name: str, out: Path, scenario: ss.Scenario, quick: bool) -> tuple[ss.Run, ss.Steady]:
+    """A run to its end, in a store where an earlier call may have finished it, and the stationary state next to that end.
+
+    Its figure, of this name: the observable over time, snapshots with flow, profiles.
+    """
     case = scenario.with_overrides({"time_tolerance": 10.0 * scenario.run.time_tolerance}) if quick else scenario
     found = ss.run(case, out=out / "run", resume=True)
+    save(plot_run(found.dataset), out, name)
     return found, ss.steady(case, start=found.state())
 
 

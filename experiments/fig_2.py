@@ -17,14 +17,12 @@ from pathlib import Path
 import numpy as np
 
 import shapespace as ss
-from common import Row, main, near, save, settled_run
-from shapespace.view.figure import plot_run
+from common import Row, main, near, settled_run
 
 
 def run(out: Path, quick: bool) -> list[Row]:
-    """The run, figure, table."""
-    found, steady = settled_run(out, ss.scenario("membrane-protrusion"), quick)
-    draw(found, out)
+    """The run with its figure, table."""
+    found, steady = settled_run("fig_2", out, ss.scenario("membrane-protrusion"), quick)
     data = found.dataset
     height = data["height"].to_numpy()
     first = np.abs(data["normal_velocity"].isel(time=1).to_numpy())
@@ -40,11 +38,6 @@ def run(out: Path, quick: bool) -> list[Row]:
             dissipation[-1] < 1e-4 * np.nanmax(dissipation)),
         near("height in the end (second column: found directly)", f"{known:.7g}", value, known, 1e-4),
     ]  # fmt: skip
-
-
-def draw(found: ss.Run, out: Path) -> None:
-    """The observable over time, snapshots with flow, profiles."""
-    save(plot_run(found.dataset), out, "fig_2")
 
 
 if __name__ == "__main__":

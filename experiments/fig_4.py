@@ -18,14 +18,12 @@ from pathlib import Path
 import numpy as np
 
 import shapespace as ss
-from common import Row, main, near, save, settled_run
-from shapespace.view.figure import plot_run
+from common import Row, main, near, settled_run
 
 
 def run(out: Path, quick: bool) -> list[Row]:
-    """The run, figure, table."""
-    found, steady = settled_run(out, ss.scenario("ring-slipping"), quick)
-    draw(found, out)
+    """The run with its figure, table."""
+    found, steady = settled_run("fig_4", out, ss.scenario("ring-slipping"), quick)
     data = found.dataset
     ring, radius, speed = (data[name].to_numpy() for name in ("ring_position", "equator_radius", "velocity"))
     slips = int(np.flatnonzero(np.abs(ring - 0.5) > 0.1)[0])
@@ -40,11 +38,6 @@ def run(out: Path, quick: bool) -> list[Row]:
         Row("the end", "polar, swims", str(found.outcome), "", found.outcome in (ss.Outcome.STATIONARY, ss.Outcome.REACHED_END)),
         near("speed in the end (second column: found directly)", f"{known:.7g}", value, known, 1e-4),
     ]  # fmt: skip
-
-
-def draw(found: ss.Run, out: Path) -> None:
-    """The observable over time, snapshots with flow, profiles."""
-    save(plot_run(found.dataset), out, "fig_4")
 
 
 if __name__ == "__main__":

@@ -17,14 +17,12 @@ from pathlib import Path
 import numpy as np
 
 import shapespace as ss
-from common import Row, main, near, save, settled_run
-from shapespace.view.figure import plot_run
+from common import Row, main, near, settled_run
 
 
 def run(out: Path, quick: bool) -> list[Row]:
-    """The run, figure, table."""
-    found, steady = settled_run(out, ss.scenario("guided-division"), quick)
-    draw(found, out)
+    """The run with its figure, table."""
+    found, steady = settled_run("fig_6", out, ss.scenario("guided-division"), quick)
     data = found.dataset
     radius, time = (data[name].to_numpy() for name in ("equator_radius", "time"))
     late = float(time[np.flatnonzero(radius < 0.02)[0]])
@@ -39,11 +37,6 @@ def run(out: Path, quick: bool) -> list[Row]:
             found.outcome in (ss.Outcome.STATIONARY, ss.Outcome.REACHED_END)),
         near("its radius in the end (second column: found directly)", f"{known:.7g}", value, known, 1e-5),
     ]  # fmt: skip
-
-
-def draw(found: ss.Run, out: Path) -> None:
-    """The observable over time, snapshots with flow, profiles."""
-    save(plot_run(found.dataset), out, "fig_6")
 
 
 if __name__ == "__main__":

@@ -78,10 +78,7 @@ _HOMES = {
     "movie": "view.show",
     "plot": "view.show",
 }
-__all__ = [  # noqa: PLE0604  (the table above has the names)
-    *_HOMES,
-    "__version__",
-]
+__all__ = list(_HOMES)
 
 
 def __getattr__(name: str) -> Any:

@@ -13,7 +13,7 @@ so two statements of one experiment in different units are the same computation,
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 from typing import NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -190,9 +190,18 @@ class Scales:
             units=units,
         )
 
-    @cache  # noqa: B019  (keeps all scales alive: they are few)
     def factor(self, name: str) -> float:
         """The unit of a quantity: its value in the user's units is this times its dimensionless value."""
+        if name not in self._factors:
+            self._factors[name] = self._factor(name)
+        return self._factors[name]
+
+    @cached_property
+    def _factors(self) -> dict[str, float]:
+        """Those asked for so far."""
+        return {}
+
+    def _factor(self, name: str) -> float:
         dimension = QUANTITIES[name].dimension
         try:
             factor = math.prod(getattr(self, base) ** exponent for base, exponent in dimension._asdict().items())

@@ -22,7 +22,10 @@ def with_border(
 
 
 @compiled
-def _bordered(columns, rows, corner, widths, weights, n, points, ends, targets):  # type: ignore[no-untyped-def]  # numba finds the types
+def _bordered(
+    columns: Array, rows: Array, corner: Array, widths: Array, weights: Array, n: int, points: Array, ends: Array,
+    targets: Array,
+) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
     n_rows, n_columns, k, elements = points.shape
     (n_i, n_s), (n_b, end_columns), extra = targets.shape, ends.shape, corner.shape[0]
     m = n_rows - n_i

@@ -39,7 +39,7 @@ FAST = 2.0**20
 
 
 @compiled
-def _largest_relative(change, values, columns, weights):  # type: ignore[no-untyped-def]  # numba finds the types
+def _largest_relative(change: Array, values: Array, columns: int, weights: Array) -> float:
     """max over columns of max_i |weights_i change_ic| / max(max_i |values_ic|, floor), both flat and columns wide.
 
     weights may be empty, for ones.
@@ -62,7 +62,7 @@ def _largest_relative(change, values, columns, weights):  # type: ignore[no-unty
 
 
 @compiled
-def _norm(dx, x, n, n_a, k, widths):  # type: ignore[no-untyped-def]  # numba finds the types
+def _norm(dx: Array, x: Array, n: int, n_a: int, k: int, widths: Array) -> float:
     """Of `CollocationProblem.norm`; widths (N k,): of each point's element."""
     slopes = (widths.shape[0] // k + 1) * n
     algebraic = slopes + widths.shape[0] * n
@@ -234,7 +234,7 @@ class CollocationProblem(AbstractSmoothProblem):
     def _product(self, blocks: Sequence[Array], jumps: float) -> Callable[[Array], Array]:
         """Multiplication by a matrix of these blocks (points, ends, targets), with `jumps` times the continuity rows."""
         points, ends, targets = map(read_only, blocks)
-        structure, rule = points.any(axis=(2, 3)), gauss_rule(self.degree)
+        structure, rule = np.any(points, axis=(2, 3)), gauss_rule(self.degree)
         return lambda dx: product(
             np.ascontiguousarray(dx), points, structure, ends, targets, self.mesh, rule.matrix, rule.weights, jumps
         )

@@ -18,7 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapespace.numerics.elimination import LocalFactors, Plan, eliminate_stages, make_plan, solve_stages
+from shapespace.numerics.elimination import LocalFactors, eliminate_stages, solve_stages
+from shapespace.numerics.plan import Plan, make_plan
 from shapespace.numerics.small_lu import Array, IntArray, backward, compiled, copy, forward, lu_rectangular, read_only
 
 NO_PIVOT = 1e-14
@@ -46,17 +47,10 @@ class Factors(NamedTuple):
 
 
 @compiled
-def _any(values):  # type: ignore[no-untyped-def]  # numba finds the types
-    for value in values:  # noqa: SIM110  (numba compiles loops, not generators)
-        if value != 0.0:
-            return True
-    return False
-
-
-@compiled
-def _integral_rows(  # type: ignore[no-untyped-def]  # numba finds the types
-    widths, matrix, weights, points, position, response, pivoted, dense, local, nodes, scalars
-):
+def _integral_rows(
+    widths: Array, matrix: Array, weights: Array, points: Array, position: IntArray, response: Array, pivoted: IntArray,
+    dense: Array, local: Array, nodes: Array, scalars: Array,
+) -> None:  # fmt: skip
     """Add integral rows over nodes (N + 1, n_i, n) and scalars (n_i, n_s) after condensation; `local` over the stages."""
     n_i, size, n_elements = local.shape
     n, n_s, k = nodes.shape[2], scalars.shape[1], points.shape[2]
@@ -66,7 +60,7 @@ def _integral_rows(  # type: ignore[no-untyped-def]  # numba finds the types
         for j in range(k):
             for c in range(m + n + n_s):
                 source = points[m + q, c, j]
-                if not _any(source):
+                if not source.any():
                     continue
                 target = local[q, position[j * m + c]] if c < m else total[c - m]
                 for e in range(n_elements):
@@ -78,7 +72,7 @@ def _integral_rows(  # type: ignore[no-untyped-def]  # numba finds the types
                             target[e] += widths[e] * weights[j] * source[e] * widths[e] * matrix[j, stage]
         for i in range(size):
             row = local[q, i]
-            if not _any(row):
+            if not row.any():
                 continue
             for c in range(n + n_s):
                 target, source = total[c], response[i, c]
@@ -97,7 +91,7 @@ def _integral_rows(  # type: ignore[no-untyped-def]  # numba finds the types
 
 
 @compiled
-def _eliminate_chain(relations, integral, chain, pivot):  # type: ignore[no-untyped-def]  # numba finds the types
+def _eliminate_chain(relations: Array, integral: Array, chain: Array, pivot: IntArray) -> tuple[Array, bool]:
     """Eliminate Y_1..Y_{N-1}; returns the rows left over (Y_0, Y_N, s): n chain rows and the integral rows.
 
     The active n rows read A Y_0 + B Y_e + C s = r. Stacked with the relation of (Y_e, Y_{e+1}, s) and the integral rows they
@@ -131,9 +125,10 @@ def _eliminate_chain(relations, integral, chain, pivot):  # type: ignore[no-unty
 
 
 @compiled
-def _condense(  # type: ignore[no-untyped-def]  # numba finds the types
-    widths, matrix, weights, points, ends, targets, position, response, pivoted, dense, relations, integral
-):
+def _condense(
+    widths: Array, matrix: Array, weights: Array, points: Array, ends: Array, targets: Array, position: IntArray,
+    response: Array, pivoted: IntArray, dense: Array, relations: Array, integral: Array,
+) -> tuple[tuple[Array, IntArray, Array, Array, IntArray, Array], bool]:  # fmt: skip
     """Chain and border from the relations; the factors from `chain` to `border_scale`, and whether both are regular."""
     n_elements, n, size = relations.shape
     n_i = targets.shape[0]
@@ -222,7 +217,7 @@ def determinant_sign(factors: Factors) -> float:
 
 
 @compiled
-def _signs_of_stages(pivots, others):  # type: ignore[no-untyped-def]  # numba finds the types
+def _signs_of_stages(pivots: Array, others: IntArray) -> float:
     """Product of the signs of pivots (k m, N), but for those of other elements (M,)."""
     sign = 1.0
     for i in range(pivots.shape[0]):
@@ -236,7 +231,7 @@ def _signs_of_stages(pivots, others):  # type: ignore[no-untyped-def]  # numba f
 
 
 @compiled
-def _signs_of_pivots(lu, exchanges):  # type: ignore[no-untyped-def]  # numba finds the types
+def _signs_of_pivots(lu: Array, exchanges: IntArray) -> float:
     """Product of the signs of determinants from their LU (M, rows, columns) and exchanges (M, pivots)."""
     sign = 1.0
     for index in range(exchanges.shape[0]):
@@ -248,7 +243,10 @@ def _signs_of_pivots(lu, exchanges):  # type: ignore[no-untyped-def]  # numba fi
 
 
 @compiled
-def _solve_chain(chain, pivot, defect, integral, ends, border_lu, border_pivot, border_scale):  # type: ignore[no-untyped-def]  # numba finds the types
+def _solve_chain(
+    chain: Array, pivot: IntArray, defect: Array, integral: Array, ends: Array, border_lu: Array,
+    border_pivot: IntArray, border_scale: Array,
+) -> tuple[Array, Array]:  # fmt: skip
     """Node values (N + 1, n) and scalars (n_s,) from the condensed right-hand side."""
     n_elements, n = defect.shape
     nodes = np.empty((n_elements + 1, n))
@@ -276,7 +274,7 @@ def _solve_chain(chain, pivot, defect, integral, ends, border_lu, border_pivot, 
 
 
 @compiled
-def _add_coupling(response, pivoted, dense, x, nodes, scalars):  # type: ignore[no-untyped-def]  # numba finds the types
+def _add_coupling(response: Array, pivoted: IntArray, dense: Array, x: Array, nodes: Array, scalars: Array) -> None:
     """Turn the particular stage solution x (k m, N), in pivot order, into the stages that go with nodes and scalars."""
     size, n_elements = x.shape
     n = nodes.shape[1]
@@ -298,10 +296,12 @@ def _add_coupling(response, pivoted, dense, x, nodes, scalars):  # type: ignore[
 
 
 @compiled
-def _solve(  # type: ignore[no-untyped-def]  # numba finds the types
-    widths, weights, position, partner, lower, upper, work, response, scale, pivoted, dense, exchanges, relation_scale,
-    chain, chain_pivot, local_integral, border_lu, border_pivot, border_scale, residual,
-):  # fmt: skip
+def _solve(
+    widths: Array, weights: Array, position: IntArray, partner: IntArray, lower: IntArray, upper: IntArray, work: Array,
+    response: Array, scale: Array, pivoted: IntArray, dense: Array, exchanges: IntArray, relation_scale: Array,
+    chain: Array, chain_pivot: IntArray, local_integral: Array, border_lu: Array, border_pivot: IntArray,
+    border_scale: Array, residual: Array,
+) -> Array:  # fmt: skip
     """The whole solve: residual (equations (N, k, m), continuity (N, n), ends, integrals), all flat, to x, flat."""
     size, n_elements = scale.shape
     m, n, n_i = partner.shape[0], relation_scale.shape[1], local_integral.shape[0]

@@ -1,7 +1,7 @@
 """Local elimination: the stages of all elements at once, by one sparse elimination whose inner loops run over elements.
 
-All elements share one pattern of non-zeros, so rows are matched to unknowns and pivots ordered once per pattern (weighted
-matching, then Markowitz' rule), the operations are listed once, and each becomes a vector operation over elements.
+All elements share one pattern of non-zeros, so every operation is planned once (`plan`) and becomes a vector operation over
+elements.
 What is left of an element is a relation of its end values and the scalars, n rows over (Y_e, Y_{e+1}, s).
 
 Pivots from the stage equations alone assume that Y_e determines the stages. Beside a pole it does not: collocation follows
@@ -10,42 +10,25 @@ multipliers exceed GROWTH_LIMIT, are therefore eliminated each on its own, with 
 Y_e and Y_{e+1} determine the stages together. The border of a flat disc then has a condition number of 1e2 instead of 1e16.
 """
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from shapespace.numerics.matching import cheapest_matching
-from shapespace.numerics.small_lu import Array, BoolArray, IntArray, backward, compiled, copy, forward, lu_rectangular
+from shapespace.numerics.plan import Plan
+from shapespace.numerics.small_lu import (
+    Array,
+    BoolArray,
+    IntArray,
+    backward,
+    compiled,
+    copy,
+    forward,
+    lu_rectangular,
+    put,
+)
 
 GROWTH_LIMIT = 1e4
 """Multipliers this large would cost about four digits."""
-
-ABSENT = -128
-"""Marks entries that vanish on all elements."""
-
-
-class Plan(NamedTuple):
-    """How stages of one pattern are eliminated: every operation, written down once.
-
-    position (k m,): place of each unknown (stage m + column) in the order of pivots, which rows and columns below follow;
-    partner (m,): equation -> column within a stage; structure (m, columns): non-zeros of a point's equations.
-    slot (k m, k m + n + n_s): row of the work array that holds an entry, -1 where there is none: first the pivots, then the
-    other factors, last the columns of (Y_e, s). lower, upper (., 3): row, column and slot of the factors, lower by columns
-    from the pivots down, upper by rows from the last up. scaled (.,), operations (., 3): slots of a pivot's row, and of
-    target, factor and source of target -= factor source; steps (k m + 1, 2): where each pivot's begin in them; operations
-    beyond the last pivot substitute back.
-    """
-
-    position: IntArray
-    partner: IntArray
-    structure: BoolArray
-    slot: IntArray
-    lower: IntArray
-    upper: IntArray
-    scaled: IntArray
-    operations: IntArray
-    steps: IntArray
 
 
 class LocalFactors(NamedTuple):
@@ -66,108 +49,11 @@ class LocalFactors(NamedTuple):
     relation_scale: Array
 
 
-def make_plan(widths: Array, matrix: Array, points: Array, n: int, n_equations: int) -> Plan:
-    """The plan for stage blocks points (rows, columns, k, N), of which the first n_equations rows are equations."""
-    rows, columns, k, _ = points.shape
-    reach = 0.1 * float(widths.max() * matrix.diagonal().max())
-    decades = _decades(points.reshape(rows, columns, -1), n_equations, n, reach)
-    return _matched(decades.tobytes(), n_equations, n, columns, k)
-
-
 @compiled
-def _decades(points, m, n, reach):  # type: ignore[no-untyped-def]  # numba finds the types
-    """Half the decimal logarithm of the mean size of each entry of the equations' blocks, fields times reach; (m, columns).
-
-    Whole numbers, so that round-off and slow drift keep the plan.
-    """
-    _, columns, n_points = points.shape
-    out = np.full((m, columns), ABSENT, dtype=np.int8)
-    for row in range(m):
-        for c in range(columns):
-            source, total = points[row, c], 0.0
-            for e in range(n_points):
-                total += abs(source[e])
-            if total != 0.0:
-                decade = np.log10(total / n_points * (reach if m <= c < m + n else 1.0))
-                out[row, c] = np.int8(np.round(0.5 * decade)) if abs(decade) < 200.0 else np.int8(0)
-    return out
-
-
-@lru_cache(maxsize=256)
-def _matched(decades: bytes, m: int, n: int, columns: int, k: int) -> Plan:
-    """The plan that matches rows to unknowns by size."""
-    entries = np.frombuffer(decades, dtype=np.int8).reshape(m, columns)
-    own = entries[:, :m].copy()
-    own[:, :n] = np.maximum(own[:, :n], entries[:, m : m + n])
-    # An absent entry is the last resort, so that a singular pattern has a plan as well.
-    partner = cheapest_matching(np.where(own == ABSENT, 1e3, -own.astype(float)))
-    return _plan((entries != ABSENT).tobytes(), tuple(partner.tolist()), n, k)
-
-
-@lru_cache(maxsize=64)
-def _plan(non_zeros: bytes, partners: tuple[int, ...], n: int, k: int) -> Plan:
-    """Order the pivots and list the operations: some ms, but sizes change more often than the matching."""
-    m, size, partner = len(partners), k * len(partners), np.array(partners)
-    structure = np.frombuffer(non_zeros, dtype=bool).reshape(m, -1)
-    stages = np.zeros((k, m, size + structure.shape[1] - m), dtype=bool)
-    for j in range(k):
-        stages[j, partner, j * m : (j + 1) * m] = structure[:, :m]
-        for stage in range(k):
-            stages[j, partner, stage * m : stage * m + n] |= structure[:, m : m + n]
-        stages[j, partner, size:] = structure[:, m:]
-    pattern = stages.reshape(size, -1)
-    order = _pivot_order(pattern.copy())
-    pattern = pattern[order][:, np.concatenate([order, np.arange(size, pattern.shape[1])])]
-    return Plan(np.argsort(order), partner, structure, *_operations(pattern))
-
-
-def _pivot_order(pattern: BoolArray) -> IntArray:
-    """Diagonal pivots of (size, size + columns beyond) in an order that fills little, by Markowitz' rule; fills the pattern."""
-    size = len(pattern)
-    weight, active, order = pattern[:, size:].sum(axis=1), np.arange(size), np.empty(size, dtype=np.int64)
-    for step in range(size):
-        block = pattern[np.ix_(active, active)]
-        cost = (block.sum(axis=0) - 1) * (block.sum(axis=1) - 1 + weight[active])
-        best = int(np.argmin(cost))
-        order[step] = active[best]
-        below, across = active[block[:, best]], active[block[best]]
-        pattern[np.ix_(below, across)] = True
-        weight[below] = np.maximum(weight[below], weight[order[step]])
-        active = np.delete(active, best)
-    return order
-
-
-def _operations(pattern: BoolArray) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray, IntArray]:
-    """Slots and operations of a Plan for a pattern (size, columns) in pivot order; fills the pattern."""
-    size, columns = pattern.shape
-    below, across = [], []
-    for j in range(size):
-        below.append(j + 1 + np.flatnonzero(pattern[j + 1 :, j]))
-        across.append(j + 1 + np.flatnonzero(pattern[j, j + 1 :]))
-        pattern[np.ix_(below[j], across[j])] = True
-    slot = np.full((size, columns), -1)
-    slot[np.diag_indices(size)] = np.arange(size)
-    others = pattern[:, :size] & ~np.eye(size, dtype=bool)
-    slot[:, :size][others] = size + np.arange(others.sum())
-    slot[:, size:] = size + others.sum() + np.arange(size * (columns - size)).reshape(size, -1)
-
-    def updates(rows: IntArray, pivots: IntArray, columns: IntArray) -> IntArray:
-        i, q, c = (index.ravel() for index in np.meshgrid(rows, pivots, columns, indexing="ij"))
-        return np.stack([slot[i, c], slot[i, q], slot[q, c]], axis=1)
-
-    operations = [updates(below[j], np.array([j]), across[j]) for j in range(size)]
-    steps = np.zeros((size + 1, 2), dtype=np.int64)
-    steps[1:] = np.cumsum([[len(across[j]), len(operations[j])] for j in range(size)], axis=0)
-    backwards = [(np.array([i]), across[i][across[i] < size]) for i in range(size - 1, -1, -1)]
-    operations += [updates(row, later, np.arange(size, columns)) for row, later in backwards]
-    lower = np.array([(i, j, slot[i, j]) for j in range(size) for i in (j, *below[j])])
-    upper = np.array([(i, q, slot[i, q]) for (i,), later in backwards for q in later], dtype=np.int64).reshape(-1, 3)
-    scaled = np.concatenate([slot[j, across[j]] for j in range(size)])
-    return slot, lower, upper, scaled, np.concatenate(operations), steps
-
-
-@compiled
-def _fill(widths, matrix, points, n, position, partner, structure, slot, work):  # type: ignore[no-untyped-def]  # numba finds the types
+def _fill(
+    widths: Array, matrix: Array, points: Array, n: int, position: IntArray, partner: IntArray, structure: BoolArray,
+    slot: IntArray, work: Array,
+) -> Array:  # fmt: skip
     """Write the scaled stage equations of all elements into their slots; returns the scaling of the rows."""
     _, columns, k, n_elements = points.shape
     m, size = partner.shape[0], position.shape[0]
@@ -202,7 +88,7 @@ def _fill(widths, matrix, points, n, position, partner, structure, slot, work): 
 
 
 @compiled
-def _update(work, operations, first, last):  # type: ignore[no-untyped-def]  # numba finds the types
+def _update(work: Array, operations: IntArray, first: int, last: int) -> None:
     for o in range(first, last):
         target, factor, source = work[operations[o, 0]], work[operations[o, 1]], work[operations[o, 2]]
         for e in range(work.shape[1]):
@@ -210,7 +96,7 @@ def _update(work, operations, first, last):  # type: ignore[no-untyped-def]  # n
 
 
 @compiled
-def _eliminate(work, lower, scaled, operations, steps):  # type: ignore[no-untyped-def]  # numba finds the types
+def _eliminate(work: Array, lower: IntArray, scaled: IntArray, operations: IntArray, steps: IntArray) -> Array:
     """LU in place without exchanges and back-substitution of the columns beyond; returns the largest multipliers (N,)."""
     n_elements = work.shape[1]
     size = steps.shape[0] - 1
@@ -233,7 +119,7 @@ def _eliminate(work, lower, scaled, operations, steps):  # type: ignore[no-untyp
 
 
 @compiled
-def _relations(widths, weights, position, response, jumps, m):  # type: ignore[no-untyped-def]  # numba finds the types
+def _relations(widths: Array, weights: Array, position: IntArray, response: Array, jumps: Array, m: int) -> Array:
     """[-G_e | I | J_e - S_e] (N, n, 2n + n_s) of Y_{e+1} - G_e Y_e + (J_e - S_e) s = ..., J_e the jumps."""
     size, columns, n_elements = response.shape
     n = jumps.shape[1]
@@ -256,9 +142,10 @@ def _relations(widths, weights, position, response, jumps, m):  # type: ignore[n
 
 
 @compiled
-def _eliminate_pivoted(  # type: ignore[no-untyped-def]  # numba finds the types
-    widths, weights, position, slot, filled, jumps, m, response, pivoted, dense, exchanges, relations, scale
-):
+def _eliminate_pivoted(
+    widths: Array, weights: Array, position: IntArray, slot: IntArray, filled: Array, jumps: Array, m: int,
+    response: Array, pivoted: IntArray, dense: Array, exchanges: IntArray, relations: Array, scale: Array,
+) -> bool:  # fmt: skip
     """Eliminate single elements with pivots from stage and continuity rows; filled (slots, M): their stage equations.
 
     Writes their relations and `response`; False where one of them is singular.
@@ -302,9 +189,11 @@ def _eliminate_pivoted(  # type: ignore[no-untyped-def]  # numba finds the types
 
 
 @compiled
-def _eliminate_all(  # type: ignore[no-untyped-def]  # numba finds the types
-    widths, weights, matrix, points, jumps, m, position, partner, structure, slot, lower, scaled, operations, steps
-):  # fmt: skip
+def _eliminate_all(
+    widths: Array, weights: Array, matrix: Array, points: Array, jumps: Array, m: int, position: IntArray,
+    partner: IntArray, structure: BoolArray, slot: IntArray, lower: IntArray, scaled: IntArray, operations: IntArray,
+    steps: IntArray,
+) -> tuple[tuple[Array, Array, Array, IntArray, Array, IntArray, Array], Array, bool]:  # fmt: skip
     """The fields of LocalFactors, the relations, and whether all elements are regular."""
     n_elements, n, n_s = jumps.shape
     size = position.shape[0]
@@ -346,10 +235,24 @@ def eliminate_stages(
 
 
 @compiled
-def solve_stages(  # type: ignore[no-untyped-def]  # numba finds the types
-    work, scale, pivoted, dense, exchanges, relation_scale, position, partner, lower, upper, widths, weights, equations,
-    continuity,
-):  # fmt: skip
+def substitute(work: Array, entries: IntArray, x: Array) -> None:
+    """One triangle of the LU: for each entry (i, j, slot) x_i -= work_slot x_j, or x_i *= work_slot on the diagonal."""
+    for q in range(entries.shape[0]):
+        target, source, factor = x[entries[q, 0]], x[entries[q, 1]], work[entries[q, 2]]
+        if entries[q, 0] == entries[q, 1]:
+            for e in range(x.shape[1]):
+                target[e] *= factor[e]
+        else:
+            for e in range(x.shape[1]):
+                target[e] -= factor[e] * source[e]
+
+
+@compiled
+def solve_stages(
+    work: Array, scale: Array, pivoted: IntArray, dense: Array, exchanges: IntArray, relation_scale: Array,
+    position: IntArray, partner: IntArray, lower: IntArray, upper: IntArray, widths: Array, weights: Array,
+    equations: Array, continuity: Array,
+) -> tuple[Array, Array]:  # fmt: skip
     """Stages (k m, N) for given nodes of zero, in pivot order, and the right-hand sides (N, n) of the relations."""
     size, n_elements = scale.shape
     m, n = partner.shape[0], relation_scale.shape[1]
@@ -360,36 +263,21 @@ def solve_stages(  # type: ignore[no-untyped-def]  # numba finds the types
             for e in range(n_elements):
                 x[i, e] = equations[e * size + j * m + row] * scale[i, e]
     start = np.empty((pivoted.shape[0], size + n))
-    for index in range(pivoted.shape[0]):
-        e = pivoted[index]
-        for i in range(size):
-            start[index, i] = x[i, e]
-        for i in range(n):
-            start[index, size + i] = continuity[e * n + i]
-    for q in range(lower.shape[0]):
-        target, factor, source = x[lower[q, 0]], work[lower[q, 2]], x[lower[q, 1]]
-        if lower[q, 0] == lower[q, 1]:
-            for e in range(n_elements):
-                target[e] *= factor[e]
-        else:
-            for e in range(n_elements):
-                target[e] -= factor[e] * source[e]
-    for q in range(upper.shape[0]):
-        target, factor, source = x[upper[q, 0]], work[upper[q, 2]], x[upper[q, 1]]
-        for e in range(n_elements):
-            target[e] -= factor[e] * source[e]
+    for index, e in enumerate(pivoted):
+        put(start[index, :size], x[:, e])
+        put(start[index, size:], continuity[e * n : (e + 1) * n])
+    substitute(work, lower, x)
+    substitute(work, upper, x)
     defect = continuity.copy().reshape(n_elements, n)
     for j in range(size // m):
         for i in range(n):
             source = x[position[j * m + i]]
             for e in range(n_elements):
                 defect[e, i] += widths[e] * weights[j] * source[e]
-    for index in range(pivoted.shape[0]):
-        e = pivoted[index]
+    for index, e in enumerate(pivoted):
         forward(dense[index], exchanges[index], start[index])
         for i in range(n):
             defect[e, i] = relation_scale[index, i] * start[index, size + i]
         backward(dense[index], size, start[index, :size])
-        for i in range(size):
-            x[i, e] = start[index, i]
+        put(x[:, e], start[index, :size])
     return x, defect

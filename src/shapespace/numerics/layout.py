@@ -14,11 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from shapespace.numerics.small_lu import Array, compiled, put
+from shapespace.numerics.small_lu import Array, BoolArray, compiled, put
 
 
 @compiled
-def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, points_per_tile):  # type: ignore[no-untyped-def]  # numba finds the types
+def lay_out(
+    x: Array, p: Array, coefficient: float, history: Array, mesh: Array, matrix: Array, stages: Array, n: int, n_a: int,
+    n_q: int, points_per_tile: int,
+) -> Array:  # fmt: skip
     """Tiles (n_tiles, size) of x and all else that they hold; history (N k + 2, n_q), flat, or (1,) for zero. Linear in x.
 
     stages (k,): the Gauss points on [0, 1]; matrix (k, k): integrals of their basis. Points beyond the last repeat it.
@@ -77,7 +80,9 @@ def lay_out(x, p, coefficient, history, mesh, matrix, stages, n, n_a, n_q, point
 
 
 @compiled
-def assembled(values, x, mesh, weights, n, m, n_i, points_per_tile):  # type: ignore[no-untyped-def]  # numba finds the types
+def assembled(
+    values: Array, x: Array, mesh: Array, weights: Array, n: int, m: int, n_i: int, points_per_tile: int
+) -> Array:
     """The flat residual from what came back (n_tiles, size): equations, continuity of x, end conditions, integral conditions."""
     elements, k, size = mesh.shape[0] - 1, weights.shape[0], points_per_tile
     slopes, equations = (elements + 1) * n, elements * k * m
@@ -106,7 +111,10 @@ def assembled(values, x, mesh, weights, n, m, n_i, points_per_tile):  # type: ig
 
 
 @compiled
-def product(x, points, structure, ends, targets, mesh, matrix, weights, jumps):  # type: ignore[no-untyped-def]  # numba finds the types
+def product(
+    x: Array, points: Array, structure: BoolArray, ends: Array, targets: Array, mesh: Array, matrix: Array,
+    weights: Array, jumps: float,
+) -> Array:  # fmt: skip
     """A collocation matrix with blocks as in `condensation.factorise` times x, flat as the residual.
 
     structure (m + n_i, m + n + n_s): which entries of `points` are not zero throughout. jumps: factor of the continuity rows.

@@ -20,14 +20,14 @@ def read_only(array: Array) -> Array:
 
 
 @compiled
-def put(target, source):  # type: ignore[no-untyped-def]  # numba finds the types
+def put(target: Array, source: Array) -> None:
     """target[:] = source for vectors of one length; see copy."""
     for i in range(source.shape[0]):
         target[i] = source[i]
 
 
 @compiled
-def copy(target, source):  # type: ignore[no-untyped-def]  # numba finds the types
+def copy(target: Array, source: Array) -> None:
     """target[...] = source for matrices of one shape: numba compiles that for many seconds, because it may broadcast."""
     for i in range(target.shape[0]):
         for c in range(target.shape[1]):
@@ -35,7 +35,7 @@ def copy(target, source):  # type: ignore[no-untyped-def]  # numba finds the typ
 
 
 @compiled
-def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]  # numba finds the types
+def lu_rectangular(a: Array, pivot: IntArray, n_pivot_rows: int) -> bool:
     """LU in place of the first len(pivot) columns of a (rows, cols), pivots from the first n_pivot_rows rows.
 
     Four columns at a time: one pass over the rest of a row then does four updates. False where a pivot vanishes.
@@ -87,7 +87,7 @@ def lu_rectangular(a, pivot, n_pivot_rows):  # type: ignore[no-untyped-def]  # n
 
 
 @compiled
-def forward(lu, pivot, x):  # type: ignore[no-untyped-def]  # numba finds the types
+def forward(lu: Array, pivot: IntArray, x: Array) -> None:
     """Apply the row exchanges, then the inverse unit lower trapezoid of a (rows, columns) LU, to one column in place."""
     for j in range(pivot.shape[0]):
         p = pivot[j]
@@ -103,7 +103,7 @@ def forward(lu, pivot, x):  # type: ignore[no-untyped-def]  # numba finds the ty
 
 
 @compiled
-def backward(lu, size, x):  # type: ignore[no-untyped-def]  # numba finds the types
+def backward(lu: Array, size: int, x: Array) -> None:
     """Solve U x = b in place for the leading `size` unknowns; any x beyond them is known and stays.
 
     Eight sums run side by side: a single one waits for each addition, and rows are too short for the compiler to split it.
@@ -129,7 +129,7 @@ def backward(lu, size, x):  # type: ignore[no-untyped-def]  # numba finds the ty
 
 
 @compiled
-def forward_transposed(lu, pivot, x):  # type: ignore[no-untyped-def]  # numba finds the types
+def forward_transposed(lu: Array, pivot: IntArray, x: Array) -> None:
     """Apply the transpose of `forward` to one column in place."""
     columns = pivot.shape[0]
     for i in range(lu.shape[0] - 1, 0, -1):
@@ -143,7 +143,7 @@ def forward_transposed(lu, pivot, x):  # type: ignore[no-untyped-def]  # numba f
 
 
 @compiled
-def backward_transposed(lu, size, x):  # type: ignore[no-untyped-def]  # numba finds the types
+def backward_transposed(lu: Array, size: int, x: Array) -> None:
     """Apply the transpose of `backward` to one column in place: what lies beyond `size` takes its share."""
     for i in range(size):
         row = lu[i]

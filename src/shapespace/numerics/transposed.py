@@ -7,11 +7,12 @@ coupling of the stages to nodes and scalars, chain and border, integral rows, st
 import numpy as np
 
 from shapespace.numerics.condensation import Factors
-from shapespace.numerics.small_lu import Array, backward_transposed, compiled, forward_transposed, put
+from shapespace.numerics.elimination import substitute
+from shapespace.numerics.small_lu import Array, IntArray, backward_transposed, compiled, forward_transposed, put
 
 
 @compiled
-def _gather(x, position, k, n, n_elements):  # type: ignore[no-untyped-def]  # numba finds the types
+def _gather(x: Array, position: IntArray, k: int, n: int, n_elements: int) -> tuple[Array, Array, Array]:
     """Nodes (N + 1, n), stages (k m, N) in pivot order and scalars of a flat x, as copies."""
     size = position.shape[0]
     m, first = size // k, (n_elements + 1) * n
@@ -27,7 +28,7 @@ def _gather(x, position, k, n, n_elements):  # type: ignore[no-untyped-def]  # n
 
 
 @compiled
-def _couple(response, pivoted, dense, stages, nodes, scalars):  # type: ignore[no-untyped-def]  # numba finds the types
+def _couple(response: Array, pivoted: IntArray, dense: Array, stages: Array, nodes: Array, scalars: Array) -> None:
     """Nodes and scalars take what the stages that go with them owe to them."""
     size, n_elements = stages.shape
     n = nodes.shape[1]
@@ -48,7 +49,10 @@ def _couple(response, pivoted, dense, stages, nodes, scalars):  # type: ignore[n
 
 
 @compiled
-def _solve_chain(chain, chain_pivot, nodes, scalars, n_i, border_lu, border_pivot, border_scale):  # type: ignore[no-untyped-def]  # numba finds the types
+def _solve_chain(
+    chain: Array, chain_pivot: IntArray, nodes: Array, scalars: Array, n_i: int, border_lu: Array,
+    border_pivot: IntArray, border_scale: Array,
+) -> tuple[Array, Array, Array]:  # fmt: skip
     """Multipliers of the relations (N, n), the integral rows (n_i,) and the end rows (n_b,)."""
     n_elements, n, n_s = nodes.shape[0] - 1, nodes.shape[1], scalars.shape[0]
     known = np.empty((n_elements, n))
@@ -78,11 +82,15 @@ def _solve_chain(chain, chain_pivot, nodes, scalars, n_i, border_lu, border_pivo
 
 
 @compiled
-def _solve_stages(  # type: ignore[no-untyped-def]  # numba finds the types
-    work, scale, pivoted, dense, exchanges, relation_scale, position, partner, lower, upper, widths, weights, stages,
-    relations,
-):  # fmt: skip
-    """Multipliers of the equations, flat, and of the continuity rows (N, n); stages and relations are used up."""
+def _solve_stages(
+    work: Array, scale: Array, pivoted: IntArray, dense: Array, exchanges: IntArray, relation_scale: Array,
+    position: IntArray, partner: IntArray, lower: IntArray, upper: IntArray, widths: Array, weights: Array,
+    stages: Array, relations: Array,
+) -> tuple[Array, Array]:  # fmt: skip
+    """Multipliers of the equations, flat, and of the continuity rows (N, n); stages and relations are used up.
+
+    lower and upper: of the transposed factors.
+    """
     size, n_elements = stages.shape
     m, n = partner.shape[0], relations.shape[1]
     start = np.empty((pivoted.shape[0], size + n))
@@ -99,18 +107,8 @@ def _solve_stages(  # type: ignore[no-untyped-def]  # numba finds the types
             target = stages[position[j * m + i]]
             for e in range(n_elements):
                 target[e] += widths[e] * weights[j] * relations[e, i]
-    for q in range(upper.shape[0] - 1, -1, -1):
-        source, factor, target = stages[upper[q, 0]], work[upper[q, 2]], stages[upper[q, 1]]
-        for e in range(n_elements):
-            target[e] -= factor[e] * source[e]
-    for q in range(lower.shape[0] - 1, -1, -1):
-        source, factor, target = stages[lower[q, 0]], work[lower[q, 2]], stages[lower[q, 1]]
-        if lower[q, 0] == lower[q, 1]:
-            for e in range(n_elements):
-                target[e] *= factor[e]
-        else:
-            for e in range(n_elements):
-                target[e] -= factor[e] * source[e]
+    substitute(work, upper, stages)
+    substitute(work, lower, stages)
     for index in range(pivoted.shape[0]):
         e = pivoted[index]
         put(stages[:, e], start[index, :size])
@@ -122,6 +120,11 @@ def _solve_stages(  # type: ignore[no-untyped-def]  # numba finds the types
             for e in range(n_elements):
                 equations[e * size + j * m + row] = stages[i, e] * scale[i, e]
     return equations, relations
+
+
+def _transposed(entries: IntArray) -> IntArray:
+    """The entries of a triangle for `substitute` with its transpose."""
+    return np.ascontiguousarray(entries[::-1, [1, 0, 2]])
 
 
 def solve_transposed(factors: Factors, x: Array) -> Array:
@@ -138,6 +141,6 @@ def solve_transposed(factors: Factors, x: Array) -> Array:
     local = f.local
     equations, continuity = _solve_stages(
         local.work, local.scale, local.pivoted, local.dense, local.exchanges, local.relation_scale, plan.position,
-        plan.partner, plan.lower, plan.upper, f.widths, f.weights, stages, relations,
+        plan.partner, _transposed(plan.lower), _transposed(plan.upper), f.widths, f.weights, stages, relations,
     )  # fmt: skip
     return np.concatenate([equations, continuity.ravel(), ends, integrals])
