@@ -1,7 +1,8 @@
 """A branch of stationary surfaces beside AUTO-07p: guided division at Pe = 450 (Fig. 7b), ring amplitude 0 to 4.2.
 
 Both start from the sphere on 60 elements of 4 Gauss points with the mesh moved along, and locate the folds. Ours locates
-the branch points too; AUTO looks for none (peer_auto.py says why). Then ours with the leading growth rates at every point,
+the branch points too; AUTO looks for none (peer_auto.py says why). Each with its longest steps and with steps that make some
+140 points. Then ours with the leading growth rates at every point,
 which AUTO does not offer for boundary value problems, 100 points of Bratu's problem beside PyCont-Lite, and 40 points of the
 fold curve of Chan's problem with its cusp.
 
@@ -41,6 +42,8 @@ from shapespace.study.verification.classic import at_rest, bratu, chan
 KEY, END = "ring_amplitude", 4.2
 MESH_TOLERANCE = 1e-4
 """Met by 60 elements all along the branch, so that ours has as many as AUTO."""
+DENSE = 0.07
+"""Largest step that makes as many points as AUTO has with its shorter steps."""
 CHAN_CUSP = (4.1909181064, 0.0282060679)
 """(a, b); references/continuation.md, row 5."""
 BRATU_FOLD = 3.513830719125161
@@ -96,12 +99,12 @@ def _failed_spectra(points: Sequence[Point]) -> int:
     return n_failed
 
 
-def guided_division(locate: bool = True, spectra: bool = False) -> Branch:
+def guided_division(locate: bool = True, spectra: bool = False, largest: float = Arclength.largest) -> Branch:
     """Ours from the sphere to the end."""
     base = scenario("guided-division", elements=60, degree=4, mesh_tolerance=MESH_TOLERANCE, initial_ring_amplitude=0.0)
     engine, problem = Engine.of(base.with_overrides({KEY: 0.0})), KeyedProblem.of(base, (KEY,))
     x = problem.base.pack(engine.initial_state())
-    options = Arclength(first=0.05, parameter_scale=END)
+    options = Arclength(first=0.05, largest=largest, parameter_scale=END)
     return followed(problem, x, options, Stop(Parameter(0), END, "end", True), locate=locate, spectra=spectra)
 
 
@@ -146,23 +149,26 @@ def line(name: str, points: int, seconds: float) -> str:
     return f"{name:34s} {points:4d} points  {seconds:6.2f} s  {1e3 * seconds / points:6.1f} ms a point"
 
 
-def print_ours() -> tuple[Branch, float]:
+def print_ours(largest: float) -> tuple[Branch, float]:
     """Print our branch: with its singular points, without, and with growth rates as well."""
-    made, seconds = timed(guided_division)
-    print(line("ours", len(made.points), seconds), f" ends: {made.outcome}")
+    made, seconds = timed(partial(guided_division, largest=largest))
+    print(line(f"ours, largest step {largest:g}", len(made.points), seconds), f" ends: {made.outcome}")
     for fold, error in made.folds:
         print(f"    fold {fold:.9f}, estimated error {error:.0e}")
     sizes = [point.problem.base.elements for point in made.points if isinstance(point.problem, KeyedProblem)]
     others = len(made.located) - len(made.folds)
     print(f"    also located: {others} branch points; missed: {made.n_missed}; elements <= {max(sizes)}")
-    bare, seconds_bare = timed(partial(guided_division, locate=False))
+    bare, seconds_bare = timed(partial(guided_division, locate=False, largest=largest))
     print(line("ours, nothing located", len(bare.points), seconds_bare))
-    full, seconds_full = timed(partial(guided_division, spectra=True))
-    print(line("ours, with leading growth rates", len(full.points), seconds_full), f" failed: {full.n_failed}")
+    full, seconds_full = timed(partial(guided_division, spectra=True, largest=largest))
+    print(
+        line("ours, with leading growth rates", len(full.points), seconds_full),
+        f" {seconds_full / seconds:.2f} times the time without; failed: {full.n_failed}",
+    )
     return made, seconds
 
 
-def print_auto(ours: Branch, seconds: float) -> None:
+def print_auto(ours: Branch, seconds: float, step: float) -> None:
     """Print AUTO's branch beside ours, or that it is not here."""
     directory = auto_directory()
     if directory is None:
@@ -171,16 +177,13 @@ def print_auto(ours: Branch, seconds: float) -> None:
     last = ours.points[-1]
     assert isinstance(last.problem, KeyedProblem)
     mine = np.array([last.parameter, *last.problem.base.unpack(last.x).scalars[:2]])
-    for step in STEPS:
-        run = min((run_auto(directory, step) for _ in range(2)), key=lambda run: run.seconds)
-        print(line(f"AUTO-07p, DSMAX {step}", run.points, run.seconds))
-        ratio = (len(ours.points) / seconds) / (run.points / run.seconds)
-        print(
-            f"    points per second, ours to AUTO's: {ratio:.2f}; whole branches per second: {run.seconds / seconds:.2f}"
-        )
-        for theirs, (fold, _) in zip(run.folds, ours.folds, strict=True):
-            print(f"    fold {theirs:.9f}, AUTO's less ours {theirs - fold:+.1e}")
-        print(f"    end: relative differences of (Delta_c, h, p) {np.abs(np.array(run.end) / mine - 1.0)}")
+    run = min((run_auto(directory, step) for _ in range(2)), key=lambda run: run.seconds)
+    print(line(f"AUTO-07p, DSMAX {step}", run.points, run.seconds))
+    ratio = (len(ours.points) / seconds) / (run.points / run.seconds)
+    print(f"    points per second, ours to AUTO's: {ratio:.2f}; whole branches per second: {run.seconds / seconds:.2f}")
+    for theirs, (fold, _) in zip(run.folds, ours.folds, strict=True):
+        print(f"    fold {theirs:.9f}, AUTO's less ours {theirs - fold:+.1e}")
+    print(f"    end: relative differences of (Delta_c, h, p) {np.abs(np.array(run.end) / mine - 1.0)}")
 
 
 def print_pycont(points: int, seconds: float) -> None:
@@ -199,8 +202,9 @@ def print_pycont(points: int, seconds: float) -> None:
 def main() -> None:
     """Print the table."""
     print(machine())
-    ours, seconds = print_ours()
-    print_auto(ours, seconds)
+    for largest, theirs in zip((DENSE, Arclength.largest), STEPS, strict=True):
+        ours, seconds = print_ours(largest)
+        print_auto(ours, seconds, theirs)
     made, seconds = timed(bratu_branch)
     ((fold, error),) = made.folds
     print(line("Bratu, 20 elements", len(made.points), seconds))

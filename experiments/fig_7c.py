@@ -3,7 +3,8 @@
 What. Turnover holds the contractile ring at the equator against its tendency to slip to a pole. At Pe = 450, Delta_c = 4
 we compute the symmetric stationary surface on a grid in (k, R0/L_h) with the number of its growing modes. Where that
 changes we locate the pitchfork and follow it in both parameters: the boundary as a curve, with the re-entrant finger that
-Fig. S1 passes through (Sec. V B 2 of the paper).
+Fig. S1 passes through (Sec. V B 2 of the paper). At some points the dynamics starts from that surface with a little of its
+leading mode added: crosses, blue where it returns and red where it leaves.
 
 Parameters: Table 5, Pe = 450, Delta_c = 4, c_s = 10. The ranges k = 10 to 50, R0/L_h = 0.3 to 6 are ours. Units: R0,
 kappa, tau = eta_b R0^2/kappa.
@@ -15,6 +16,7 @@ first; the boundary is not monotonic, and around R0/L_h = 4.6 a finger of instab
 that at k = 28 stability is lost and found again at R0/L_h = 4.32662 and 4.84038 (Fig. S1).
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -32,6 +34,10 @@ THRESHOLD = 37.594
 """k at R0/L_h = 0.3, by Fig. 7d."""
 FINGER = (4.32662, 4.84038)
 """R0/L_h at k = 28, by Fig. S1."""
+CHECKS = ((45.0, 0.3), (34.0, 0.3), (28.0, 3.5), (28.0, 4.6), (28.0, 5.1), (20.0, 1.0))
+"""k and R0/L_h of the dynamic checks; the fourth is in the finger."""
+KICK, SWIMS = 1e-2, 1e-2
+"""Of the leading mode, and the speed from which on a surface has left the symmetric one."""
 
 
 def run(out: Path, quick: bool) -> list[Row]:
@@ -42,8 +48,9 @@ def run(out: Path, quick: bool) -> list[Row]:
         workers=1 if quick else None,
     )  # fmt: skip
     rows = check_boundary(found) + check_threshold(found)
-    draw(found, out)
-    return rows if quick else rows + check_finger(found)
+    seen = dynamics(found.scenario, () if quick else CHECKS)
+    draw(found, seen, out)
+    return rows if quick else rows + check_finger(found) + check_dynamics(found, seen)
 
 
 def crossings(curve: Curve, key: str, value: float) -> list[float]:
@@ -92,15 +99,44 @@ def check_finger(found: ss.Diagram) -> list[Row]:
     ]
 
 
-def draw(found: ss.Diagram, out: Path) -> None:
-    """Regimes by stability, with the boundary."""
+def dynamics(case: ss.Scenario, points: Sequence[tuple[float, float]]) -> dict[tuple[float, float], float]:
+    """Speeds at the ends of runs from the symmetric surface with a little of its leading mode."""
+    speeds = {}
+    for turnover, length in points:
+        at = case.with_overrides({TURNOVER: turnover, LENGTH: length, "until": 500.0})
+        found = ss.run(at, start=ss.steady(at).perturbed(KICK))
+        speeds[turnover, length] = abs(found.observables["velocity"])
+    return speeds
+
+
+def check_dynamics(found: ss.Diagram, seen: dict[tuple[float, float], float]) -> list[Row]:
+    """The dynamics leaves the symmetric surface where the map says that it is unstable."""
+    counts = found.dataset["n_unstable"]
+    rows = []
+    for (turnover, length), speed in seen.items():
+        count = int(counts.sel({TURNOVER: turnover, LENGTH: length}, method="nearest"))
+        expected = "leaves" if count else "returns"
+        told = f"{'leaves' if speed > SWIMS else 'returns'}, speed {speed:.1e}"
+        rows.append(
+            Row(f"dynamics at k = {turnover:g}, R0/L_h = {length:g}", expected, told, "", told.startswith(expected))
+        )
+    return rows
+
+
+def draw(found: ss.Diagram, seen: dict[tuple[float, float], float], out: Path) -> None:
+    """Regimes by stability, with the boundary and the dynamic checks."""
     with style.house_style():
         figure, (axes,) = panels((1.0,), 90.0)
         draw_regimes(axes, found, found.regimes)
         draw_boundaries(axes, found)
+        for point, speed in seen.items():
+            colour, told = (style.RED, "dynamics leaves") if speed > SWIMS else (style.BLUE, "dynamics returns")
+            axes.plot(*point, "x", color=colour, ms=5.0, zorder=4, label=told)
         axes.set_xlabel(quantity_label(found.scenario, TURNOVER))
         axes.set_ylabel(style.math_symbol("R0/L_h"))
-        figure.legend(*axes.get_legend_handles_labels(), loc="outside right upper")
+        handles, names = axes.get_legend_handles_labels()
+        once = dict(zip(names, handles, strict=True))
+        figure.legend(once.values(), once.keys(), loc="outside right upper")
         save(figure, out, "fig_7c")
 
 
