@@ -1,16 +1,16 @@
 """A branch of stationary surfaces beside AUTO-07p: guided division at Pe = 450 (Fig. 7b), ring amplitude 0 to 4.2.
 
 Both start from the sphere on 60 elements of 4 Gauss points with the mesh moved along, and locate the folds. Ours locates
-the branch points too; AUTO looks for none (peer_auto.py says why). Each with its longest steps and with steps that make some
-140 points. Then ours with the leading growth rates at every point,
-which AUTO does not offer for boundary value problems, 100 points of Bratu's problem beside PyCont-Lite, and 40 points of the
-fold curve of Chan's problem with its cusp.
+the branch points too; AUTO looks for none (peer_auto.py says why) and is compared with ours locating folds alone, each with
+its longest steps and with steps that make some 140 points. Then ours with the leading growth rates at every point, which
+AUTO does not offer for boundary value problems, 100 points of Bratu's problem beside PyCont-Lite, and 40 points of the fold
+curve of Chan's problem with its cusp.
 
 Times are processor time on one core, everything compiled, the better of two.
 Run from the root: python -m benchmarks.bench_branch   (about two minutes)
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import NamedTuple, TypeVar
 
@@ -25,13 +25,13 @@ from benchmarks import peer_pycont
 from benchmarks.peer_auto import MISSING, STEPS, auto_directory, run_auto
 
 from shapespace.analysis.bifurcation import Kind, SingularPoint
-from shapespace.analysis.branch import Point
+from shapespace.analysis.branch import Point, brackets
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
 from shapespace.analysis.curves import Special, own_parameter, start_curve, traced_curve
 from shapespace.analysis.extended import Parameter
 from shapespace.analysis.stability import Spectrum, solve_spectrum
 from shapespace.analysis.stationary import solve_stationary
-from shapespace.analysis.tracing import Located, traced
+from shapespace.analysis.tracing import Located, Missed, singular_points, traced
 from shapespace.base.arrays import Array
 from shapespace.base.problem import AbstractSmoothProblem
 from shapespace.study.engine import Engine
@@ -67,20 +67,33 @@ class Branch(NamedTuple):
         return [(point.parameter, point.parameter_error) for point in self.located if point.kind is Kind.FOLD]
 
 
+Trace = Callable[[Continuation], Iterable[Point | Located | Missed]]
+
+
+def with_folds(branch: Continuation) -> Iterator[Point | Located | Missed]:
+    """The points of a branch with its folds, as AUTO gives them."""
+    last = branch.past[-1]
+    for point in branch:
+        if any(bracket.kind == "fold" for bracket in brackets(last, point)):
+            yield from singular_points(last, point)
+        yield point
+        last = point
+
+
 def followed(
     problem: AbstractSmoothProblem,
     x: Array,
     options: Arclength,
     *stops: Stop,
-    locate: bool = True,
+    trace: Trace = traced,
     spectra: bool = False,
 ) -> Branch:
-    """The branch from the state near x at parameter 0, with its singular points and its growth rates if wanted."""
+    """The branch from the state near x at parameter 0, with what `trace` locates and its growth rates if wanted."""
     found = solve_stationary(problem, x, np.zeros(1))
     start = start_point(found.problem, found.x, found.p, 0, options=options)
     assert isinstance(start, Point)
     branch = Continuation([start], stops, options)
-    met = [start, *(traced(branch) if locate else branch)]
+    met = [start, *trace(branch)]
     points = [one for one in met if isinstance(one, Point)]
     n_failed = _failed_spectra(points) if spectra else 0
     located = [one.point for one in met if isinstance(one, Located)]
@@ -99,13 +112,13 @@ def _failed_spectra(points: Sequence[Point]) -> int:
     return n_failed
 
 
-def guided_division(locate: bool = True, spectra: bool = False, largest: float = Arclength.largest) -> Branch:
+def guided_division(trace: Trace = traced, spectra: bool = False, largest: float = Arclength.largest) -> Branch:
     """Ours from the sphere to the end."""
     base = scenario("guided-division", elements=60, degree=4, mesh_tolerance=MESH_TOLERANCE, initial_ring_amplitude=0.0)
     engine, problem = Engine.of(base.with_overrides({KEY: 0.0})), KeyedProblem.of(base, (KEY,))
     x = problem.base.pack(engine.initial_state())
     options = Arclength(first=0.05, largest=largest, parameter_scale=END)
-    return followed(problem, x, options, Stop(Parameter(0), END, "end", True), locate=locate, spectra=spectra)
+    return followed(problem, x, options, Stop(Parameter(0), END, "end", True), trace=trace, spectra=spectra)
 
 
 def bratu_branch() -> Branch:
@@ -150,7 +163,7 @@ def line(name: str, points: int, seconds: float) -> str:
 
 
 def print_ours(largest: float) -> tuple[Branch, float]:
-    """Print our branch: with its singular points, without, and with growth rates as well."""
+    """Print our branch: with its singular points, its folds alone, nothing located, and growth rates. The one with folds."""
     made, seconds = timed(partial(guided_division, largest=largest))
     print(line(f"ours, largest step {largest:g}", len(made.points), seconds), f" ends: {made.outcome}")
     for fold, error in made.folds:
@@ -158,14 +171,16 @@ def print_ours(largest: float) -> tuple[Branch, float]:
     sizes = [point.problem.base.elements for point in made.points if isinstance(point.problem, KeyedProblem)]
     others = len(made.located) - len(made.folds)
     print(f"    also located: {others} branch points; missed: {made.n_missed}; elements <= {max(sizes)}")
-    bare, seconds_bare = timed(partial(guided_division, locate=False, largest=largest))
+    folds, seconds_folds = timed(partial(guided_division, trace=with_folds, largest=largest))
+    print(line("ours, folds alone located", len(folds.points), seconds_folds))
+    bare, seconds_bare = timed(partial(guided_division, trace=iter, largest=largest))
     print(line("ours, nothing located", len(bare.points), seconds_bare))
     full, seconds_full = timed(partial(guided_division, spectra=True, largest=largest))
     print(
         line("ours, with leading growth rates", len(full.points), seconds_full),
         f" {seconds_full / seconds:.2f} times the time without; failed: {full.n_failed}",
     )
-    return made, seconds
+    return folds, seconds_folds
 
 
 def print_auto(ours: Branch, seconds: float, step: float) -> None:

@@ -5,12 +5,11 @@ import platform
 import time
 from collections.abc import Callable
 from pathlib import Path
-
-import numpy as np
+from statistics import median
 
 
 def use_one_core() -> None:
-    """Confine this process to one core; to be called before the array libraries start their threads."""
+    """Confine this process to one core; to be called before numpy is imported: its threads would spin on that core."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if hasattr(os, "sched_setaffinity"):
@@ -25,7 +24,7 @@ def milliseconds(work: Callable[[], object], repetitions: int = 200) -> tuple[fl
         start = time.perf_counter()
         work()
         times.append(time.perf_counter() - start)
-    return 1e3 * min(times), 1e3 * float(np.median(times))
+    return 1e3 * min(times), 1e3 * median(times)
 
 
 def machine() -> str:

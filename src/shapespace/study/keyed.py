@@ -9,6 +9,7 @@ so that derivatives along a key are exact, also where one key moves many paramet
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -34,23 +35,24 @@ class Powers:
 
     def slope(self, q: Array, dq: Array) -> Array:
         """dp (n_p,) along dq (m,)."""
-        return sum((self._partial(q, (k,)) * dq[k] for k in range(len(q))), np.zeros_like(self.amplitudes))
+        moved = [(partial, d) for partial, d in zip(self._partials, dq, strict=True) if d]
+        return sum((partial.value(q) * d for partial, d in moved), np.zeros_like(self.amplitudes))
 
     def bend(self, q: Array, dq: Array, eq: Array) -> Array:
         """The second derivative (n_p,) along dq and eq (m,)."""
-        keys = range(len(q))
-        terms = (self._partial(q, (k, l)) * dq[k] * eq[l] for k in keys for l in keys)
+        terms = (partial.slope(q, eq) * d for partial, d in zip(self._partials, dq, strict=True) if d)
         return sum(terms, np.zeros_like(self.amplitudes))
 
-    def _partial(self, q: Array, keys: tuple[int, ...]) -> Array:
-        """The derivative by one key after another."""
-        factor, exponents = self.amplitudes.copy(), self.exponents.copy()
-        for k in keys:
-            factor = factor * exponents[:, k]
-            exponents[:, k] -= 1.0
-        # A vanished factor stands for a constant, whose lowered powers need not be finite.
-        powers = _power(q, np.where(factor[:, None] == 0.0, 0.0, exponents))
-        return np.asarray(factor * powers.prod(axis=1))
+    @cached_property
+    def _partials(self) -> list["Powers"]:
+        """The derivative by each key, products of powers too."""
+        return [self._partial(k) for k in range(self.exponents.shape[1])]
+
+    def _partial(self, k: int) -> "Powers":
+        amplitudes, exponents = self.amplitudes * self.exponents[:, k], self.exponents.copy()
+        exponents[:, k] -= 1.0
+        # A vanished amplitude stands for a constant, whose lowered powers need not be finite.
+        return Powers(amplitudes, np.where(amplitudes[:, None] == 0.0, 0.0, exponents))
 
 
 def _power(q: Array, exponents: Array) -> Array:
