@@ -84,6 +84,8 @@ export class Stage {
   show(phase) {
     const { state, mode } = session;
     this.host.style.opacity = state?.isComing ? 0.45 : 1;
+    // What is drawn stays, paler, until the shape is there.
+    if (state?.isComing && state.fields) return;
     if (!state?.fields) {
       this.outline.show(null);
       this.profiles.show(null);
