@@ -31,6 +31,8 @@ BRACKET = 1e-10
 """The search for a special point ends where its bracket is this part of the first one."""
 BESIDE = 1e-5
 """Shares of the way by which to step aside from a point where the system is singular."""
+ASIDE = 0.02
+"""The same for places that tell where it is."""
 TOGETHER = 1e-3
 """Special points nearer to each other, relative to the step, are one."""
 STENCIL = 3e-3
@@ -256,12 +258,29 @@ def special_points(one: Readings, other: Readings) -> list[Special | NotFound]:
 
 
 def locate(before: Point, after: Point, function: Function) -> float | None:
-    """The share of the way to a zero of a function between two neighbours, by the Illinois method; None where it is not found."""
+    """The share of the way to a zero of a function between two neighbours; None where it is not found.
+
+    Where `regularity` vanishes Newton fails and round-off rules: its zero is that of a cubic through places beside it.
+    """
 
     def at(share: float) -> float:
         place = point_between(before, after, share)
         return float("nan") if place is None else function(place)
 
+    if function is not regularity:
+        return _searched(at, BRACKET)
+    share = _searched(at, ASIDE)
+    if share is None:
+        return None
+    places = share + ASIDE * np.array([-2.0, -1.0, 1.0, 2.0])
+    values = np.array([at(place) for place in places])
+    if not (np.sign(values) == np.sign(values[0]) * np.array([1.0, 1.0, -1.0, -1.0])).all():
+        return None
+    return float(np.polynomial.Polynomial.fit(values, places, 3)(0.0))
+
+
+def _searched(at: Callable[[float], float], bracket: float) -> float | None:
+    """A zero between 0 and 1 by the Illinois method, to a bracket of this length; None where it is not found."""
     low, high = (0.0, at(0.0)), (1.0, at(1.0))
     scale = max(abs(low[1]), abs(high[1]))
     if not low[1] * high[1] <= 0.0:
@@ -269,10 +288,10 @@ def locate(before: Point, after: Point, function: Function) -> float | None:
     for _ in range(60):
         share = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
         value = at(share)
-        if np.isnan(value):  # where the system itself is singular, Newton may fail
-            return share if at(share - BESIDE) * at(share + BESIDE) < 0.0 else None
+        if np.isnan(value):
+            return None
         low, high = (high if value * high[1] < 0.0 else (low[0], 0.5 * low[1])), (share, value)
-        if abs(high[0] - low[0]) <= BRACKET or abs(value) <= 1e-12 * scale:
+        if abs(high[0] - low[0]) <= bracket or abs(value) <= 1e-12 * scale:
             return share
     return None
 
