@@ -69,7 +69,10 @@ _ADVICE = {
     Outcome.SELF_INTERSECTING: "The surface passes through itself already at the start: choose another one.",
     Outcome.MAX_ITERATIONS: "Newton ran out of iterations: start from a nearer state or take a smaller step.",
     Outcome.DIVERGED: "Newton could not reduce the residual: start from a nearer state or take a smaller step.",
-    Outcome.SINGULAR: "The linear system is singular: an unknown is left free or a condition is repeated.",
+    Outcome.SINGULAR: (
+        "The linear system is singular: this is a fold or a branch point, so start a little beside it; or, in a law of your own, "
+        "an unknown is left free or a condition is repeated."
+    ),
     Outcome.NOT_FINITE: "A NaN or infinity appeared: check the start and the parameters.",
     Outcome.STEP_UNDERFLOW: (
         "The time step fell below its minimum: raise `elements`, loosen `time_tolerance`, or check the parameters."
