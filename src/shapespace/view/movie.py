@@ -176,7 +176,7 @@ class Scene:
         surface = still.add_axes(_SURFACE_BOX)
         prepare_snapshot_axes(surface, self._limits)
         self._flow_key = self._draw_flow_key(surface)
-        draw_length_key(surface, run, camera, self._limits, at=0.5)
+        draw_length_key(surface, run, camera, self._limits, at=0.62)
         if run.is_open:
             draw_coat_key(surface, camera, self._limits, on_top=True)
         elif run.regulator:
