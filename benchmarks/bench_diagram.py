@@ -174,7 +174,7 @@ def scheduler(count: int) -> None:
     """What Dask takes for a task that does nothing, and what a tile takes besides its points."""
     from distributed import Client, LocalCluster
 
-    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": None}
+    options = {"n_workers": 2, "threads_per_worker": 1, "dashboard_address": ":0"}
     with LocalCluster(**options) as cluster, Client(cluster, set_as_default=False) as client:
         client.gather(client.map(abs, range(100), pure=False))
         wall, own = time.perf_counter(), time.process_time()

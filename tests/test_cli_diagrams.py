@@ -67,7 +67,7 @@ def test_a_cluster_that_cannot_help_is_one_line(shell: Shell, monkeypatch: pytes
     assert "no scheduler answers there" in one_complaint(shell(*command, "tcp://127.0.0.1:9"))
     monkeypatch.setattr("shapespace.study.cluster.SECONDS", 60.0)
     monkeypatch.setattr("shapespace.study.cluster._version", lambda: "0.0.9")
-    options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    options = {"n_workers": 1, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
     with distributed.LocalCluster(**options) as cluster:
         complaint = one_complaint(shell(*command, cluster.scheduler_address))
     assert re.search(r"has shapespace 0\.0\.9, not .*; install the same version there", complaint)

@@ -266,7 +266,7 @@ def test_a_killed_client_leaves_no_process_and_loses_nothing(name: str, request:
 
 def test_a_cluster_gives_the_same_map(stored: Diagram, tmp_path: Path):
     distributed = pytest.importorskip("distributed")
-    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": None}
+    options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
     tiles, done = without(stored, tmp_path / "d", [(0, 1), (1, 1)]), list[Done]()
     with distributed.LocalCluster(**options) as cluster:
         choices = {"states": ("trivial", "default"), "resume": True, "progress": done.append}

@@ -260,7 +260,8 @@ def special_points(one: Readings, other: Readings) -> list[Special | NotFound]:
 def locate(before: Point, after: Point, function: Function) -> float | None:
     """The share of the way to a zero of a function between two neighbours; None where it is not found.
 
-    Where `regularity` vanishes Newton fails and round-off rules: its zero is that of a cubic through places beside it.
+    Where `regularity` vanishes Newton fails and round-off rules: its zero is that of a cubic through places beside it,
+    and a place where Newton fails is where to look.
     """
 
     def at(share: float) -> float:
@@ -269,7 +270,7 @@ def locate(before: Point, after: Point, function: Function) -> float | None:
 
     if function is not regularity:
         return _searched(at, BRACKET)
-    share = _searched(at, ASIDE)
+    share = _searched(lambda place: float(np.nan_to_num(at(place))), ASIDE)
     if share is None:
         return None
     places = share + ASIDE * np.array([-2.0, -1.0, 1.0, 2.0])
