@@ -153,7 +153,7 @@ class Sweep:
         problem = self.found[run[0]].problem
         xs = [self._on(problem, one) for one in run]
         distances = np.array([np.abs(self.p(one) - self.p(at)).sum() for one in run])
-        guess = sum((w * x for w, x in zip(_weights(distances), xs, strict=True)), np.zeros_like(xs[0]))
+        guess = lagrange_weights(distances) @ np.array(xs)
         state = self._newton(problem, guess, self.p(at))
         if state.outcome is not Outcome.CONVERGED:
             self.reasons[at] = state.outcome
@@ -199,11 +199,13 @@ class Sweep:
         return Stationary(problem, root.x, p, root.outcome, root.correction, np.nan, iterations, move < MAX_MOVES)
 
 
-def _weights(distances: Array) -> Array:
-    """Of values at distances (m,) to one side, in the value at distance 0 of the polynomial through them."""
+def lagrange_weights(distances: Array) -> Array:
+    """Of values at distances (m,), which may have both signs, in the value at distance 0 of the polynomial through them."""
     apart = distances - distances[:, None]
-    np.fill_diagonal(apart, distances)
-    return np.asarray((distances / apart).prod(axis=1))
+    np.fill_diagonal(apart, 1.0)
+    shares = distances / apart
+    np.fill_diagonal(shares, 1.0)
+    return np.asarray(shares.prod(axis=1))
 
 
 def _is_near(state: Stationary, other: Stationary) -> bool:

@@ -1,14 +1,16 @@
 """The state at a point of a stored diagram, which holds numbers only: computed again from what is known nearby."""
 
 from collections import OrderedDict
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import zarr
 
-from shapespace.analysis.stationary import Stationary, step_to
-from shapespace.analysis.sweeping import SWEEP_NEWTON
+from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
+from shapespace.analysis.sweeping import SWEEP_NEWTON, lagrange_weights
+from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.diagram_store import CODES, OUTCOME, DiagramStore, open_diagram
@@ -19,6 +21,8 @@ from shapespace.study.tiles import TELLING, Surveyor, find_state
 
 KEPT = 64
 """States to go on from: those beside a known one are a few Newton steps away."""
+BLOCK = 4
+"""Tiles along each axis whose middle states are interpolated: mostly one Newton step is then enough, and seldom more than two."""
 SHORTEST = 1.0 / 16.0
 """Of the way from a known state that is worth a step, before the tile is computed again."""
 _CHECKED = ("area", "length")
@@ -54,7 +58,7 @@ class DiagramStates:
         if place not in self._known and self._stored(OUTCOME, place) != CODES[Outcome.CONVERGED]:
             raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
         number, at = place[0], (place[1], place[2])
-        found = self._known.get(place) or self._stepped(place)
+        found = self._known.get(place) or self._interpolated(place) or self._stepped(place)
         if found is None:
             found = find_state(self._store, self._diagram, number, at)
         if found is None:
@@ -79,6 +83,33 @@ class DiagramStates:
             if tile is not None:
                 return f"{self._anchors[number].state}-{tile}"
         return None
+
+    def _interpolated(self, place: Place) -> Stationary | None:
+        """From the polynomial through the middles of the tiles around; None where one of them has no state, or it misses.
+
+        Where several states of a point are numbered by their energy, one number is not one sheet of states.
+        """
+        if self._store.request.branches:
+            return None
+        grid, anchors = self._grid, self._anchors[place[0]]
+        number = {tile: position for position, tile in enumerate(grid.tiles)}
+        goal = grid.values(*place[1:]).reshape(2)
+        tiles, weights = [], []
+        for axis, position, value in zip((grid.x, grid.y), place[1:], goal, strict=True):
+            near = np.argsort(np.abs(axis.anchors - position), kind="stable")[:BLOCK]
+            tiles.append(near.tolist())
+            weights.append(lagrange_weights(axis.values[axis.anchors[near]] - value))
+        numbers = [number[tile] for tile in product(*tiles)]
+        if any(anchors.outcomes[one] is not Outcome.CONVERGED for one in numbers):
+            return None
+        problem = self._surveyor.state(anchors.meshes[numbers[0]], anchors.xs[numbers[0]], goal).problem
+        xs: list[Array] = []
+        for one in numbers:
+            state = self._surveyor.state(anchors.meshes[one], anchors.xs[one], goal)
+            xs.append(state.problem.carried(state.x, problem))
+        guess = np.outer(*weights).ravel() @ np.array(xs)
+        found = solve_stationary(problem, guess, goal, SWEEP_NEWTON)
+        return found if found.outcome is Outcome.CONVERGED and self._is_stored(found, place) else None
 
     def _stepped(self, place: Place) -> Stationary | None:
         """By a few long steps from the nearest known state; None where they lead elsewhere."""

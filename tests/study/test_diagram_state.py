@@ -1,0 +1,54 @@
+"""States of a stored diagram, computed again where they are asked for."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shapespace.analysis.sweeping import lagrange_weights
+from shapespace.base.outcome import Outcome
+from shapespace.study.diagram_state import DiagramStates
+from shapespace.study.diagram_store import CODES
+from shapespace.study.diagrams import Diagram, diagram
+from shapespace.study.scenario import scenario
+
+X, Y = "peclet=80:120:76", "inverse_hydrodynamic_length=1:1.001:2"
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Diagram:
+    """Swimmers away from the onset, in four tiles."""
+    case = scenario("polar-swimmer", elements=20, mesh_tolerance=1e-3)
+    return diagram(case, X, Y, out=tmp_path_factory.mktemp("states") / "swimmer", workers=1)
+
+
+def test_a_state_is_found_again_in_one_or_two_steps(stored: Diagram):
+    """Also one beyond the middles of all tiles, where their polynomial extrapolates."""
+    assert stored.converged == stored.points == 152
+    for i, j in ((0, 0), (3, 1), (20, 0), (33, 1), (50, 0), (75, 1)):
+        again = DiagramStates(stored.store).state((0, i, j))
+        assert 1 <= again.found.iterations <= 2, (i, j)
+        point = stored.dataset.isel(peclet=i, inverse_hydrodynamic_length=j)
+        for name in ("area", "velocity", "pressure"):
+            assert again.observables[name] == pytest.approx(float(point[name]), rel=1e-7), (name, i, j)
+
+
+def test_a_tile_without_a_state_leaves_its_neighbours_theirs(tmp_path: Path):
+    """No swimmer below its onset at 22: those above are come to by steps from the middle of their own tile."""
+    case = scenario("polar-swimmer", elements=20, mesh_tolerance=1e-3)
+    map_ = diagram(case, "peclet=10:40:12", "inverse_hydrodynamic_length=0.5:1:2", out=tmp_path / "onset", workers=1)
+    exists = map_.dataset["outcome"].values == CODES[Outcome.CONVERGED]
+    assert exists.any()
+    assert not exists.all()
+    states = DiagramStates(map_.store)
+    for j, i in np.argwhere(exists):
+        velocity = float(map_.dataset["velocity"][j, i])
+        assert states.state((0, int(i), int(j))).observables["velocity"] == pytest.approx(velocity, rel=1e-7)
+
+
+def test_weights_reproduce_a_polynomial():
+    """Of degree m - 1, at a place between the values, beyond them and at one of them."""
+    for places in ([-2.0, -0.5, 1.0, 3.0], [1.0, 2.0, 4.0], [0.0, 1.0, -1.0]):
+        at = np.array(places)
+        values = np.polynomial.polynomial.polyval(at, np.arange(1.0, len(at) + 1.0))
+        assert lagrange_weights(at) @ values == pytest.approx(1.0, abs=1e-12)
