@@ -8,7 +8,7 @@ import pytest
 from shapespace.analysis.sweeping import lagrange_weights
 from shapespace.base.outcome import Outcome
 from shapespace.study.diagram_state import DiagramStates
-from shapespace.study.diagram_store import CODES
+from shapespace.study.diagram_store import CODES, DiagramStore
 from shapespace.study.diagrams import Diagram, diagram
 from shapespace.study.scenario import scenario
 
@@ -26,7 +26,7 @@ def test_a_state_is_found_again_in_one_or_two_steps(stored: Diagram):
     """Also one beyond the middles of all tiles, where their polynomial extrapolates."""
     assert stored.converged == stored.points == 152
     for i, j in ((0, 0), (3, 1), (20, 0), (33, 1), (50, 0), (75, 1)):
-        again = DiagramStates(stored.store).state((0, i, j))
+        again = DiagramStates(DiagramStore.open(stored.store)).state((0, i, j))
         assert 1 <= again.found.iterations <= 2, (i, j)
         point = stored.dataset.isel(peclet=i, inverse_hydrodynamic_length=j)
         for name in ("area", "velocity", "pressure"):
@@ -40,7 +40,7 @@ def test_a_tile_without_a_state_leaves_its_neighbours_theirs(tmp_path: Path):
     exists = map_.dataset["outcome"].values == CODES[Outcome.CONVERGED]
     assert exists.any()
     assert not exists.all()
-    states = DiagramStates(map_.store)
+    states = DiagramStates(DiagramStore.open(map_.store))
     for j, i in np.argwhere(exists):
         velocity = float(map_.dataset["velocity"][j, i])
         assert states.state((0, int(i), int(j))).observables["velocity"] == pytest.approx(velocity, rel=1e-7)

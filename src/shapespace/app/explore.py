@@ -15,6 +15,8 @@ from shapespace.study.files import storage, write_atomically
 
 UNDISTURBED = 3.0
 """Seconds after which what computes is loaded though no page has come yet."""
+FIRST = 1.5
+"""Seconds to read the first store in before the address is told: together with a browser that opens it takes longer."""
 MOST_STATES = 4000
 """Of all stores in one file: each state takes some kilobytes."""
 
@@ -49,6 +51,9 @@ class Explorer:
             proxy_headers=False,
         )
         self._server = uvicorn.Server(config)
+        first = threading.Thread(target=self._read, args=(0,), daemon=True)
+        first.start()
+        first.join(FIRST)
 
     def serve(self) -> None:
         """Answer until interrupted or stopped."""
@@ -63,13 +68,16 @@ class Explorer:
         """Listen no longer, where `serve` was never called."""
         self._socket.close()
 
+    def _read(self, number: int) -> None:
+        """Read what the page shows first of a store; what is wrong with it the page tells."""
+        with suppress(InputError):
+            self.catalogue.source(number).overview()
+
     def _prepare(self) -> None:
-        """Read what the page shows first while the browser still opens; load what computes when that is shown."""
-        for number in range(len(self.catalogue.paths)):
-            with suppress(InputError):
-                self.catalogue.source(number).overview()
-            if number == 0:
-                self.catalogue.is_shown.wait(UNDISTURBED)
+        """Read the other stores while the page opens; load what computes when that is shown."""
+        self.catalogue.is_shown.wait(UNDISTURBED)
+        for number in range(1, len(self.catalogue.paths)):
+            self._read(number)
         for number in range(len(self.catalogue.paths)):
             with suppress(InputError, StopIteration):
                 self.catalogue.source(number).warm()

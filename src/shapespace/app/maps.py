@@ -1,24 +1,20 @@
 """Diagrams for the page: one map at a time, the numbers at a point, and its shape, which is computed again."""
 
-import asyncio
 import math
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import zarr
 
 from shapespace.app.encoding import codes, exact, finite
 from shapespace.app.source import AbstractSource, described
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
-from shapespace.base.scales import QUANTITIES
 from shapespace.study.curve_store import Curve, outline
+from shapespace.study.diagram_numbers import DiagramNumbers
 from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, OUTCOME, REGIME, UNSTABLE, Diagram, DiagramStore
-from shapespace.study.files import storage
-from shapespace.study.frame import Array, Frame
+from shapespace.study.frame import Frame
 from shapespace.study.regimes import describe, telling_aspects
 from shapespace.study.scenario import Scenario
 from shapespace.study.telling import most_telling
@@ -42,13 +38,11 @@ class DiagramSource(AbstractSource):
     def __init__(self, path: Path) -> None:
         super().__init__(path)
         self._states: DiagramStates | None = None
-        self._arrays: dict[str, Any] | None = None
-        self._read: dict[str, Array] = {}
+        self._numbers: DiagramNumbers | None = None
 
     def forget(self) -> None:
         super().forget()
-        self._states = self._arrays = None
-        self._read = {}
+        self._states = self._numbers = None
 
     def store(self) -> DiagramStore:
         store = super().store()
@@ -58,12 +52,13 @@ class DiagramSource(AbstractSource):
     def content(self) -> dict[str, Any]:
         store = self.store()
         request, scenario = store.request, store.scenario
-        names = [name for name in self.arrays() if name not in (OUTCOME, *ABOUT_SOLUTION)]
-        outcomes = self._values(OUTCOME)
+        numbers = self.numbers()
+        names = [name for name in numbers.names if name not in (OUTCOME, *ABOUT_SOLUTION)]
+        outcomes = numbers.whole(OUTCOME)
         found = outcomes == IS_STATE
 
         def change(name: str) -> float:
-            values = self._values(name)[found] if name in names else np.zeros(1)
+            values = numbers.whole(name)[found] if name in names else np.zeros(1)
             values = values[np.isfinite(values)]
             return float(np.ptp(values)) if values.size else 0.0
 
@@ -83,11 +78,12 @@ class DiagramSource(AbstractSource):
 
     def values(self, name: str) -> dict[str, Any]:
         """One observable on all points (state, y, x), NaN where there is no state."""
-        if name not in self.arrays():
+        numbers = self.numbers()
+        if name not in numbers.names:
             raise InputError(f"{name[:60]}: is no observable of this diagram.")
         if name == REGIME:
             return self._regimes()
-        values = np.where(self._values(OUTCOME) == IS_STATE, self._values(name), np.nan)
+        values = np.where(numbers.whole(OUTCOME) == IS_STATE, numbers.whole(name), np.nan)
         return {"name": name, "values": exact(values)}
 
     def _regimes(self) -> dict[str, Any]:
@@ -95,7 +91,8 @@ class DiagramSource(AbstractSource):
         # Imported late: it brings the library of pictures.
         from shapespace.view.style import GREY, REGIMES
 
-        codes = np.where(self._values(OUTCOME) == IS_STATE, self._values(REGIME), 0)
+        numbers = self.numbers()
+        codes = np.where(numbers.whole(OUTCOME) == IS_STATE, numbers.whole(REGIME), 0)
         aspects = int(telling_aspects([*map(int, np.unique(codes[codes > 0]))]))
         kinds = [int(code) for code in np.unique(codes & aspects) if code]
         colours = [one for one in REGIMES if one != GREY]
@@ -108,7 +105,7 @@ class DiagramSource(AbstractSource):
         request = store.request
         keys = request.grid.keys
         x, y = request.grid.values(i, j).ravel().tolist()
-        there = self._numbers_at(number, i, j)
+        there = self.numbers().at(number, i, j)
         code = int(there.pop(OUTCOME))
         reason = next((outcome for outcome, known in CODES.items() if known == code), None)
         unstable = there.pop(UNSTABLE, np.nan)
@@ -125,7 +122,7 @@ class DiagramSource(AbstractSource):
 
     def places(self) -> Iterator[str]:
         i, j = self._strides()
-        outcomes = self._values(OUTCOME)[:, ::j, ::i]
+        outcomes = self.numbers().whole(OUTCOME)[:, ::j, ::i]
         return (f"{s},{i * x},{j * y}" for s, y, x in np.argwhere(outcomes == IS_STATE))
 
     def questions(self) -> Iterator[tuple[str, dict[str, str]]]:
@@ -133,7 +130,7 @@ class DiagramSource(AbstractSource):
         points = len(store.request.labels) * int(np.prod(store.request.grid.shape))
         if points > MOST_POINTS:
             raise InputError(f"{self.path}: its {points} points are too many for one file, at most {MOST_POINTS}.")
-        for name in self.arrays():
+        for name in self.numbers().names:
             yield "values", {"name": name}
         for place in self.places():
             yield "state", {"place": place}
@@ -190,7 +187,7 @@ class DiagramSource(AbstractSource):
             # Imported late, as solvers take seconds to load.
             from shapespace.study.diagram_state import DiagramStates
 
-            self._states = DiagramStates(self.path)
+            self._states = DiagramStates(self.store(), self.numbers())
         return self._states
 
     def _place(self, text: str) -> tuple[int, int, int]:
@@ -204,53 +201,12 @@ class DiagramSource(AbstractSource):
             raise InputError(f"{text[:40]}: is no point of this diagram, which has {' by '.join(map(str, limits))}.")
         return state, i, j
 
-    def arrays(self) -> dict[str, Any]:
-        """What is stored at each point (y, x) or (state, y, x), to read part by part; observables in the glossary's order."""
+    def numbers(self) -> DiagramNumbers:
+        """What is stored at its points, as it is now."""
         self.store()
-        if self._arrays is None:
-            with storage(self.path):
-                try:
-                    group: Any = zarr.open_group(self.path, mode="r")
-                    found = {name: array for name, array in group.arrays() if array.ndim >= 2}
-                except (ValueError, KeyError, FileNotFoundError) as error:
-                    raise StoreError(f"{self.path / 'zarr.json'}: is damaged or missing ({error}).") from None
-            known = {name: place for place, name in enumerate(QUANTITIES)}
-            names = sorted(found, key=lambda name: (known.get(name, len(known)), name))
-            self._arrays = {name: found[name] for name in names}
-        return self._arrays
-
-    def _values(self, name: str) -> Array:
-        """An array (state, y, x)."""
-        arrays = self.arrays()
-        if name in self._read:
-            return self._read[name]
-        values = np.asarray(arrays[name][...])
-        values = values.reshape(-1, *values.shape[-2:])
-        if self.store().outcome is not None:
-            # Of a diagram that is still being computed it would grow old.
-            self._read[name] = values
-        return values
-
-    def _numbers_at(self, number: int, i: int, j: int) -> dict[str, float]:
-        """All arrays at a point, of which only the parts that hold it are read, all at once."""
-        arrays = self.arrays()
-        there = {name: float(values[min(number, len(values) - 1), j, i]) for name, values in self._read.items()}
-        missing = [name for name in arrays if name not in there]
-        numbers = _numbers([arrays[name] for name in missing], [(number, j, i), (j, i)])
-        there |= zip(missing, numbers, strict=True)
-        return {name: there[name] for name in arrays}
-
-
-def _numbers(arrays: Sequence[Any], places: Sequence[tuple[int, ...]]) -> list[float]:
-    """What each array has at that place which has as many indices as it has dimensions."""
-    at = {len(place): place for place in places}
-
-    async def read() -> list[Any]:
-        return await asyncio.gather(*(array.async_array.getitem(at[array.ndim]) for array in arrays))
-
-    # In a thread of its own, since a notebook has a loop of events in this one.
-    with ThreadPoolExecutor(1) as pool:
-        return [float(one) for one in pool.submit(asyncio.run, read()).result()]
+        if self._numbers is None:
+            self._numbers = DiagramNumbers(self.store())
+        return self._numbers
 
 
 def _boundary(curve: Curve) -> dict[str, Any]:

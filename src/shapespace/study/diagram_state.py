@@ -2,21 +2,19 @@
 
 from collections import OrderedDict
 from itertools import product
-from pathlib import Path
-from typing import Any
 
 import numpy as np
-import zarr
 
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.analysis.sweeping import SWEEP_NEWTON, lagrange_weights
 from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
-from shapespace.study.diagram_store import CODES, OUTCOME, DiagramStore, open_diagram
+from shapespace.study.diagram_numbers import DiagramNumbers
+from shapespace.study.diagram_store import CODES, OUTCOME, Diagram, DiagramStore
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.scenario import Scenario
-from shapespace.study.steady import Steady, observables_at
+from shapespace.study.steady import Steady
 from shapespace.study.tiles import TELLING, Surveyor, find_state
 
 KEPT = 64
@@ -33,42 +31,49 @@ Place = tuple[int, int, int]
 
 
 class DiagramStates:
-    """The states of a stored diagram, each checked against what is stored of it."""
+    """The states of a stored diagram, each checked against what is stored of it. numbers: of the store, where they are open."""
 
-    def __init__(self, path: str | Path) -> None:
-        self._store = DiagramStore.open(path)
-        self._diagram = open_diagram(path)
-        self._grid = self._store.request.grid
-        self._anchors = [*self._store]
-        grid = self._grid
+    def __init__(self, store: DiagramStore, numbers: DiagramNumbers | None = None) -> None:
+        self._store, self._scenario, self._request = store, store.scenario, store.request
+        self._numbers = numbers or DiagramNumbers(store)
+        self._diagram = Diagram(self._scenario, self._request, store.path)
+        self._grid = grid = self._request.grid
+        self._number = {tile: position for position, tile in enumerate(grid.tiles)}
+        self._anchors = [*store]
         self._middles = np.array([(grid.x.anchors[i], grid.y.anchors[j]) for i, j in grid.tiles])
         self._found = [np.flatnonzero([one is Outcome.CONVERGED for one in of.outcomes]) for of in self._anchors]
-        self._surveyor = Surveyor(self._store.scenario, self._grid.keys, stability=False)
-        group: Any = zarr.open_group(path, mode="r")
-        self._arrays = {name: group[name] for name in (OUTCOME, *_CHECKED)}
-        self._known: OrderedDict[Place, Stationary] = OrderedDict()
+        self._surveyor = Surveyor(self._scenario, grid.keys, stability=False)
+        self._known: OrderedDict[Place, Steady] = OrderedDict()
 
     def scenario_at(self, place: Place) -> Scenario:
         """The scenario with the values of both keys there."""
         keys = zip(self._grid.keys, self._grid.values(*place[1:]).ravel().tolist(), strict=True)
-        return self._store.scenario.with_overrides(dict(keys))
+        return self._scenario.with_overrides(dict(keys))
 
     def state(self, place: Place) -> Steady:
         """The state at a point. InputError where the diagram has none, StoreError where it is not found again."""
-        if place not in self._known and self._stored(OUTCOME, place) != CODES[Outcome.CONVERGED]:
-            raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
-        number, at = place[0], (place[1], place[2])
-        found = self._known.get(place) or self._interpolated(place) or self._stepped(place)
-        if found is None:
-            found = find_state(self._store, self._diagram, number, at)
-        if found is None:
-            raise StoreError(f"{self._store.path}: the state at this point was not found again; resume the diagram.")
-        self._known[place] = found
+        if place not in self._known:
+            self._known[place] = self._again(place)
         self._known.move_to_end(place)
         if len(self._known) > KEPT:
             self._known.popitem(last=False)
-        assert isinstance(found.problem, KeyedProblem)
-        return Steady(self.scenario_at(place), found.problem, found)
+        return self._known[place]
+
+    def _again(self, place: Place) -> Steady:
+        """The state at a point, computed again."""
+        stored = self._numbers.at(*place, (OUTCOME, *_CHECKED))
+        if stored[OUTCOME] != CODES[Outcome.CONVERGED]:
+            raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
+        scenario = self.scenario_at(place)
+        for way in (self._interpolated, self._stepped, self._swept):
+            found = way(place)
+            if found is not None and found.outcome.is_success:
+                assert isinstance(found.problem, KeyedProblem)
+                steady = Steady(scenario, found.problem, found)
+                mine = steady.observables
+                if all(abs(mine[name] - stored[name]) <= TELLING * abs(mine[name]) for name in _CHECKED):
+                    return steady
+        raise StoreError(f"{self._store.path}: the state at this point was not found again; resume the diagram.")
 
     def anchor(self, place: Place) -> int | None:
         """The number of the nearest tile in whose middle the state is stored, None where there is none."""
@@ -78,28 +83,27 @@ class DiagramStates:
 
     def origin(self, place: Place) -> str | None:
         """The label of the nearest stored state that the diagram was computed from, None where there is none."""
-        for number in range(len(self._anchors)) if self._store.request.branches else place[:1]:
+        for number in range(len(self._anchors)) if self._request.branches else place[:1]:
             tile = self.anchor((number, *place[1:]))
             if tile is not None:
                 return f"{self._anchors[number].state}-{tile}"
         return None
 
     def _interpolated(self, place: Place) -> Stationary | None:
-        """From the polynomial through the middles of the tiles around; None where one of them has no state, or it misses.
+        """From the polynomial through the states in the middles of the tiles around; None where one of them is missing.
 
         Where several states of a point are numbered by their energy, one number is not one sheet of states.
         """
-        if self._store.request.branches:
+        if self._request.branches:
             return None
         grid, anchors = self._grid, self._anchors[place[0]]
-        number = {tile: position for position, tile in enumerate(grid.tiles)}
         goal = grid.values(*place[1:]).reshape(2)
         tiles, weights = [], []
         for axis, position, value in zip((grid.x, grid.y), place[1:], goal, strict=True):
             near = np.argsort(np.abs(axis.anchors - position), kind="stable")[:BLOCK]
             tiles.append(near.tolist())
             weights.append(lagrange_weights(axis.values[axis.anchors[near]] - value))
-        numbers = [number[tile] for tile in product(*tiles)]
+        numbers = [self._number[tile] for tile in product(*tiles)]
         if any(anchors.outcomes[one] is not Outcome.CONVERGED for one in numbers):
             return None
         problem = self._surveyor.state(anchors.meshes[numbers[0]], anchors.xs[numbers[0]], goal).problem
@@ -108,8 +112,7 @@ class DiagramStates:
             state = self._surveyor.state(anchors.meshes[one], anchors.xs[one], goal)
             xs.append(state.problem.carried(state.x, problem))
         guess = np.outer(*weights).ravel() @ np.array(xs)
-        found = solve_stationary(problem, guess, goal, SWEEP_NEWTON)
-        return found if found.outcome is Outcome.CONVERGED and self._is_stored(found, place) else None
+        return solve_stationary(problem, guess, goal, SWEEP_NEWTON)
 
     def _stepped(self, place: Place) -> Stationary | None:
         """By a few long steps from the nearest known state; None where they lead elsewhere."""
@@ -124,25 +127,17 @@ class DiagramStates:
         i, j = self._middles[number].tolist()
         middle = i, j
         if near is not None and self._distance((near[1], near[2]), place) <= self._distance(middle, place):
-            start = self._known[near]
+            start = self._known[near].found
         else:
             anchors = self._anchors[place[0]]
             values = self._grid.values(*middle).reshape(2)
             start = self._surveyor.state(anchors.meshes[number], anchors.xs[number], values)
         goal = self._grid.values(*place[1:]).reshape(2)
-        found = step_to(start, goal, SWEEP_NEWTON, SHORTEST) if not np.array_equal(start.p, goal) else start
-        return found if found.outcome.is_success and self._is_stored(found, place) else None
+        return step_to(start, goal, SWEEP_NEWTON, SHORTEST) if not np.array_equal(start.p, goal) else start
 
-    def _is_stored(self, found: Stationary, place: Place) -> bool:
-        """Whether a state is that of the diagram; of the store only this point is read."""
-        assert isinstance(found.problem, KeyedProblem)
-        mine = observables_at(self.scenario_at(place), found.problem.base, found.x)
-        return all(abs(mine[name] - self._stored(name, place)) <= TELLING * abs(mine[name]) for name in _CHECKED)
-
-    def _stored(self, name: str, place: Place) -> float:
-        """What the store has at a point; only this is read of it."""
-        number, i, j = place
-        return float(self._arrays[name][(number, j, i) if len(self._store.request.labels) > 1 else (j, i)])
+    def _swept(self, place: Place) -> Stationary | None:
+        """As the diagram itself came there."""
+        return find_state(self._store, self._diagram, place[0], place[1:])
 
     @staticmethod
     def _distance(one: tuple[int, int], place: Place) -> int:

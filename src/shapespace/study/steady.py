@@ -87,7 +87,7 @@ class Steady(Presented):
         """What the scenario computes with, on the state's mesh."""
         return replace(Engine.of(self.scenario), problem=self.problem.base)
 
-    @property
+    @cached_property
     def observables(self) -> dict[str, float]:
         """By their contract names, in the scenario's units."""
         return observables_at(self.scenario, self.problem.base, self.found.x)

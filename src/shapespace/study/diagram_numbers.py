@@ -1,0 +1,66 @@
+"""The numbers of a stored diagram, read part by part: of a map of many points all of them take long."""
+
+import asyncio
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import zarr
+
+from shapespace.base.errors import StoreError
+from shapespace.base.scales import QUANTITIES
+from shapespace.study.diagram_store import DiagramStore
+from shapespace.study.files import storage
+from shapespace.study.frame import Array
+
+TOGETHER = {"codec_pipeline.batch_size": 64}
+"""Chunks that are decoded in one go: half the time of one by one."""
+
+
+class DiagramNumbers:
+    """Arrays of a diagram by name, observables in the glossary's order. StoreError where they are damaged.
+
+    Those that were read whole are kept if the diagram is finished, as otherwise they would grow old.
+    """
+
+    def __init__(self, store: DiagramStore) -> None:
+        self._is_finished = store.outcome is not None
+        with storage(store.path), zarr.config.set(TOGETHER):
+            try:
+                group: Any = zarr.open_group(store.path, mode="r")
+                found = {name: array for name, array in group.arrays() if array.ndim >= 2}
+            except (ValueError, KeyError, FileNotFoundError) as error:
+                raise StoreError(f"{store.path / 'zarr.json'}: is damaged or missing ({error}).") from None
+        known = {name: place for place, name in enumerate(QUANTITIES)}
+        self.names = sorted(found, key=lambda name: (known.get(name, len(known)), name))
+        self._arrays = {name: found[name] for name in self.names}
+        self._read: dict[str, Array] = {}
+
+    def whole(self, name: str) -> Array:
+        """An array (states, n_y, n_x)."""
+        if name in self._read:
+            return self._read[name]
+        values = np.asarray(self._arrays[name][...])
+        values = values.reshape(-1, *values.shape[-2:])
+        if self._is_finished:
+            self._read[name] = values
+        return values
+
+    def at(self, number: int, i: int, j: int, names: Iterable[str] = ()) -> dict[str, float]:
+        """The numbers of a state at values i and j of x and y, all or some by name; what several states share stands for each."""
+        names = list(names) or self.names
+        there = {name: self._read[name] for name in names if name in self._read}
+        known = {name: float(values[min(number, len(values) - 1), j, i]) for name, values in there.items()}
+        missing = [name for name in names if name not in known]
+        places = {2: (j, i), 3: (number, j, i)}
+
+        async def read() -> list[Any]:
+            arrays = (self._arrays[name] for name in missing)
+            return await asyncio.gather(*(array.async_array.getitem(places[array.ndim]) for array in arrays))
+
+        if missing:
+            # In a thread of its own, since a notebook has a loop of events in this one.
+            with ThreadPoolExecutor(1) as pool:
+                known |= zip(missing, map(float, pool.submit(asyncio.run, read()).result()), strict=True)
+        return {name: known[name] for name in names}
