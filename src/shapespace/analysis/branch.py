@@ -13,9 +13,11 @@ from shapespace.base.arrays import Array
 from shapespace.base.problem import REST, AbstractContinuableProblem, AbstractLinearisation
 
 TANGENT_ERROR = 1e-4
-"""Last correction of a tangent found with factors from nearby, in the norm of the problem; predictions need no better."""
+"""Of a tangent found with factors from nearby, in the norm of the problem; predictions need no better."""
 MAX_CORRECTIONS = 4
 """Of such a tangent; new factors cost as much."""
+MAX_REFINEMENTS = 2
+"""Of the solution that tells whether factors are near."""
 NEARBY = 0.1
 """Factors stand for the Jacobian at a point where they reduce the error of any solution at least this much."""
 
@@ -113,19 +115,24 @@ def direction_at(
 def _direction_nearby(plane: ExtendedProblem, X: Array, p: Array, nearby: AbstractLinearisation) -> Direction | None:
     """The direction by iteration with factors A0 from nearby; None where they are too far for it.
 
-    They are near where A0^-1 A v is v but for a small part, for a v = A0^-1 g in which directions that A0 almost annuls stand
-    out: the determinants of A0 and A can differ in sign only where A0^-1 A has a negative eigenvalue.
+    They are near where the iteration for A^-1 g converges, a solution in which directions that A almost annuls stand out: the
+    determinants of A0 and A can differ in sign only where A0^-1 A has a negative eigenvalue, and there it diverges.
     """
-    generic = nearby.solve(_generic(len(X), 0))
-    missing = generic - nearby.solve(plane.derivative(X, p, generic))
-    if not plane.norm(missing, X) <= NEARBY * plane.norm(generic, X):
+    known = _generic(len(X), 0)
+    generic = nearby.solve(known)
+    for _ in range(MAX_REFINEMENTS):
+        missing = nearby.solve(known - plane.derivative(X, p, generic))
+        generic = generic + missing
+        if plane.norm(missing, X) <= NEARBY * plane.norm(generic, X):
+            break
+    else:
         return None
     tangent = nearby.solve(_last_unit(X))
     for _ in range(MAX_CORRECTIONS):
         correction = nearby.solve(plane.derivative(X, p, tangent) - _last_unit(X))
         tangent = tangent - correction
-        if plane.norm(correction, X) <= TANGENT_ERROR:
-            return Direction(tangent, _test(nearby, generic + missing))
+        if NEARBY * plane.norm(correction, X) <= TANGENT_ERROR:
+            return Direction(tangent, _test(nearby, generic))
     return None
 
 

@@ -152,9 +152,9 @@ class Continuation:
         """Try steps until one is accepted; None where they become too small."""
         problem = past[-1].problem.adapted(past[-1].x)
         assert isinstance(problem, AbstractContinuableProblem)
-        places = [point.on(problem) for point in past]
-        places[-1] = replace(places[-1], test=test_on(places[-1], problem))
-        trial = _Trial(places, self.options, self.newton)
+        now = past[-1].on(problem)
+        now = replace(now, test=test_on(now, problem))
+        trial = _Trial(past[:-1], now, self.options, self.newton)
         step = past[-1].step
         while step >= self.options.smallest:
             ahead = trial.step(step)
@@ -181,10 +181,10 @@ class _Crossed(NamedTuple):
 
 
 class _Trial:
-    """Steps from one point on one discretisation, of any length."""
+    """Steps of any length from the point `now` on its discretisation. past: points before it, on any."""
 
-    def __init__(self, places: Sequence[Point], options: Arclength, newton: Newton) -> None:
-        self.places, self.now, self.options, self.newton = places, places[-1], options, newton
+    def __init__(self, past: Sequence[Point], now: Point, options: Arclength, newton: Newton) -> None:
+        self.past, self.now, self.options, self.newton = past, now, options, newton
         self.crossed: _Crossed | None = None
         self.beyond: list[tuple[float, float]] = []
         self.X = self.now.joined
@@ -194,10 +194,11 @@ class _Trial:
     def predicted(self, step: float) -> tuple[Array, int]:
         """X ahead, and the order of its error: by the cubic through an earlier point, or by the tangent."""
         now = self.now
-        for earlier in self.places[-2::-1]:
+        for earlier in reversed(self.past):
             length = now.arclength - earlier.arclength
             if length >= 0.2 * step:
-                cubic = hermite(earlier.joined, earlier.tangent, self.X, now.tangent, length)
+                there = earlier.on(now.problem)
+                cubic = hermite(there.joined, there.tangent, self.X, now.tangent, length)
                 return np.asarray(polyval(length + step, cubic)), 4
         return self.X + step * now.tangent, 2
 
@@ -236,8 +237,8 @@ class _Trial:
 
     @property
     def _longest_step(self) -> float:
-        """Largest distance of neighbours among the places."""
-        return max((b.arclength - a.arclength for a, b in pairwise(self.places)), default=0.0)
+        """Largest distance of neighbours among the points up to here."""
+        return max((b.arclength - a.arclength for a, b in pairwise([*self.past, self.now])), default=0.0)
 
     def _crossed(self, step: float, end: Point) -> _Crossed:
         """Where the branch point lies that a step has crossed: by the parabola through the last two such steps."""
@@ -249,14 +250,15 @@ class _Trial:
         return self.crossed
 
     def _hides_branch_points(self, step: float, end: Point) -> bool:
-        """Whether the test function, as a parabola through the last place, this point and the end, dips below zero between."""
-        if len(self.places) < 2 or not self.places[-2].test * self.now.test > 0.0:
+        """Whether the test function, as a parabola through the point before, this one and the end, dips below zero between."""
+        before = self.past[-1] if self.past else None
+        if before is None or len(before.x) != len(self.now.x) or not before.test * self.now.test > 0.0:
             return False
-        back = self.places[-2].arclength - self.now.arclength
+        back = before.arclength - self.now.arclength
         # 1 + b s + a s^2 through all three, in units of its value here.
-        before, after = (self.places[-2].test / self.now.test - 1.0) / back, (end.test / self.now.test - 1.0) / step
-        a = (after - before) / (step - back)
-        b = after - a * step
+        behind, ahead = (before.test / self.now.test - 1.0) / back, (end.test / self.now.test - 1.0) / step
+        a = (ahead - behind) / (step - back)
+        b = ahead - a * step
         return a > 0.0 and 0.0 < -b < 2.0 * a * step and b * b > 4.0 * a
 
     def stop(self, end: Point, s: float, stop: Stop) -> Point | None:
