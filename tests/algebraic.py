@@ -62,7 +62,11 @@ class AlgebraicProblem(AbstractSmoothProblem):
         return np.asarray(self._second_derivative(x, p, one, dp, other, ep))
 
     def actions(self, x: Array, p: Array) -> Actions:
-        return Actions(lambda dx: self.derivative(x, p, dx, np.zeros_like(p)), lambda dx: -dx)
+        return Actions(
+            lambda dx: self.derivative(x, p, dx, np.zeros_like(p)),
+            lambda dx: -dx,
+            lambda s: self.linearise(x, p, Rate.of_growth(self.stored(x, p), s))[1],
+        )
 
     def weights(self, x: Array) -> Array:
         return 1.0 / np.maximum(np.abs(x), 1.0) ** 2

@@ -23,28 +23,17 @@ def assert_holds(name: str, out: Path, quick: bool) -> None:
         assert (out / f"{name}.{suffix}").stat().st_size > 10_000
 
 
-@pytest.fixture(scope="module")
-def quick_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One folder for all, since some go on from what others stored."""
-    return tmp_path_factory.mktemp("quick")
-
-
-@pytest.fixture(scope="module")
-def full_out(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("full")
-
-
 @pytest.mark.usefixtures("own_models")
 @pytest.mark.parametrize("name", QUICK)
-def test_quick(name: str, quick_out: Path):
-    assert_holds(name, quick_out, quick=True)
+def test_quick(name: str, tmp_path: Path):
+    assert_holds(name, tmp_path, quick=True)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("own_models")
 @pytest.mark.parametrize("name", FULL)
-def test_full(name: str, full_out: Path):
-    assert_holds(name, full_out, quick=False)
+def test_full(name: str, tmp_path: Path):
+    assert_holds(name, tmp_path, quick=False)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -36,3 +36,7 @@ def test_products_are_derivatives(case: str):
     dq = (problem.stored(x + e * dx, p) - problem.stored(x - e * dx, p)) / (2.0 * e)
     by_difference = (problem.residual(x, p, Rate(0.0, e * dq)) - problem.residual(x, p, Rate(0.0, -e * dq))) / (2.0 * e)
     np.testing.assert_allclose(actions.mass(dx), by_difference, rtol=1e-7, atol=1e-7 * np.abs(by_difference).max())
+    shift = 7.0
+    factors = actions.factors(shift)
+    np.testing.assert_allclose(factors.solve(actions.jacobian(dx) + shift * actions.mass(dx)), dx, rtol=0.0, atol=1e-9)
+    assert factors.sign == problem.linearise(x, p, Rate.of_growth(problem.stored(x, p), shift))[1].sign

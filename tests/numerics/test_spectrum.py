@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from shapespace.analysis.stability import Spectral, Spectrum, solve_spectrum
 from shapespace.base.arrays import Array, Traced
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import REST, AbstractLinearisation, Border, Rate
+from shapespace.base.problem import REST, AbstractLinearisation, Actions, Rate
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.newton import Newton, solve_root
@@ -173,7 +173,9 @@ def test_higher_degrees_converge():
 def dense_rates(problem: CollocationProblem, x: Array, p: Array) -> Array:
     """All finite eigenvalues of the dense pencil, by QZ."""
     unit = np.eye(len(x))
-    jacobian, mass = (np.stack([action(column) for column in unit], axis=1) for action in problem.actions(x, p))
+    actions = problem.actions(x, p)
+    products = (actions.jacobian, actions.mass)
+    jacobian, mass = (np.stack([product(column) for column in unit], axis=1) for product in products)
     alpha, beta = scipy.linalg.eigvals(jacobian, -mass, homogeneous_eigvals=True)
     finite = np.abs(beta) > 1e-7 * np.abs(alpha)
     return alpha[finite] / beta[finite]
@@ -275,9 +277,9 @@ class Liar(AbstractLinearisation):
 class Contradictory(CollocationProblem):
     """At rest the determinant has the wrong sign, as if a real rate had been missed."""
 
-    def linearise(self, x: Array, p: Array, rate: Rate, border: Border | None = None):
-        residual, factors = super().linearise(x, p, rate, border)
-        return residual, Liar(factors) if rate.coefficient < 0.1 else factors
+    def actions(self, x: Array, p: Array) -> Actions:
+        honest = super().actions(x, p)
+        return honest._replace(factors=lambda s: Liar(honest.factors(s)) if s < 0.1 else honest.factors(s))
 
 
 def test_a_contradiction_is_said():

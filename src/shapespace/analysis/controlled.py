@@ -78,7 +78,11 @@ class ControlledProblem(AbstractSmoothProblem):
     def actions(self, x: Array, p: Array) -> Actions:
         """Of the inner problem; the condition holds at once."""
         mass, still = self.inner.actions(*self.split(x, p)).mass, np.zeros_like(p)
-        return Actions(lambda dx: self.derivative(x, p, dx, still), lambda dx: np.append(mass(dx[:-1]), 0.0))
+        return Actions(
+            lambda dx: self.derivative(x, p, dx, still),
+            lambda dx: np.append(mass(dx[:-1]), 0.0),
+            lambda s: self.linearise(x, p, Rate.of_growth(self.stored(x, p), s))[1],
+        )
 
     def stored(self, x: Array, p: Array) -> Array:
         """Of the inner problem."""

@@ -133,7 +133,7 @@ def solve_spectrum(
             continue
         last = pairs
         if pairs.defects.max(initial=0.0) <= VERIFIED and search.agrees(pairs):
-            names = _names(pairs, problem.weights(x), symmetries or {}, conserved or {})
+            names = _names(pairs, search.weights, symmetries or {}, conserved or {})
             growing = (pairs.rates.real > 0.0) & ~pairs.neutral
             return search.spectrum(Outcome.CONVERGED, pairs, names, int(np.count_nonzero(growing)))
         shift = 2.0 * pairs.disc.centre
@@ -154,12 +154,13 @@ class _Search:
         self.applications = 0
         self.factorisations = 0
         self.actions = self.problem.actions(self.x, self.p)
+        self.weights = self.problem.weights(self.x)
         self.signs: dict[float, float] = {}
 
     def pencil(self, shift: float) -> Pencil:
         """Factorised at a shift, and its sign noted; a shift that meets a rate gives way to the right."""
         for _ in range(self.options.max_attempts):
-            pencil = Pencil(self.problem, self.x, self.p, shift, self.actions)
+            pencil = Pencil(self.actions, shift, self.weights)
             self.factorisations += 1
             if not pencil.linearisation.is_singular:
                 break
@@ -228,7 +229,7 @@ class _Search:
                 modes[i] -= defect
                 if defects[i] <= self.options.accuracy:
                     break
-            modes[i] *= _phase(modes[i]) / np.sqrt(self.problem.weights(self.x) @ np.abs(modes[i]) ** 2)
+            modes[i] *= _phase(modes[i]) / np.sqrt(self.weights @ np.abs(modes[i]) ** 2)
         accuracy = np.maximum(ritz.residuals[: ritz.settled], max(self.options.accuracy, self.options.state_error))
         accuracy[leading] = np.maximum(accuracy[leading], defects)
         errors = np.abs(pencil.shift - rates) * krylov.conditions(ritz)[: ritz.settled] * accuracy
@@ -264,7 +265,7 @@ class _Search:
             rates=rates,
             modes=pairs.modes,
             errors=pairs.errors[pairs.leading],
-            parities=_parities(self.problem, self.x, pairs.modes),
+            parities=_parities(self.problem, self.x, self.weights, pairs.modes),
             neutral=names,
             n_unstable=unstable,
             disc=pairs.disc,
@@ -315,9 +316,11 @@ def _phase(mode: ComplexArray) -> complex:
     return complex(largest.conjugate() / abs(largest))
 
 
-def _parities(problem: AbstractSmoothProblem, x: Array, modes: ComplexArray) -> tuple[str | None, ...]:
+def _parities(
+    problem: AbstractSmoothProblem, x: Array, weights: Array, modes: ComplexArray
+) -> tuple[str | None, ...]:
     """How the modes of a symmetric state behave under the symmetry."""
-    weights, image = problem.weights(x), problem.reflected(x)
+    image = problem.reflected(x)
     if image is None or weights @ (image - x) ** 2 > ALIGNED**2 * (weights @ x**2):
         return (None,) * len(modes)
 

@@ -114,10 +114,11 @@ class AbstractContinuableProblem(AbstractProblem):
 
 
 class Actions(NamedTuple):
-    """Products with the matrices of a pencil at one state, dx (n,) -> (n,): the Jacobian J and the mass B."""
+    """The pencil J + s B at one state: products dx (n,) -> (n,) with the Jacobian J and the mass B, and factors at a real s."""
 
     jacobian: Callable[[Array], Array]
     mass: Callable[[Array], Array]
+    factors: Callable[[float], AbstractLinearisation]
 
 
 class AbstractSmoothProblem(AbstractContinuableProblem):
@@ -129,7 +130,7 @@ class AbstractSmoothProblem(AbstractContinuableProblem):
 
     @abstractmethod
     def actions(self, x: Array, p: Array) -> Actions:
-        """J dx = F_x dx and B dx = dF/d(dq/dt) dq/dx dx at rest."""
+        """Of J = F_x and B = dF/d(dq/dt) dq/dx at rest."""
 
     def refined(self) -> "AbstractSmoothProblem | None":
         """The same problem on a discretisation about twice as fine, to estimate errors; None where there is none."""

@@ -206,13 +206,17 @@ class CollocationProblem(AbstractSmoothProblem):
     ) -> tuple[Array, CollocationLinearisation]:
         """Residual and factorised Jacobian. A border's columns become scalars, its rows integral conditions."""
         residual, points, ends, targets = self.blocks(x, p, rate)
-        rule, extra = gauss_rule(self.degree), list[Array]()
-        if border is not None:
-            points, ends, targets, *extra = with_border(
-                border, self._widths, rule.weights, self.n, points, ends, targets
-            )
-        factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *extra)
-        return residual, CollocationLinearisation(self, factors)
+        if border is None:
+            return residual, self._factorised(points, ends, targets)
+        weights = gauss_rule(self.degree).weights
+        return residual, self._factorised(
+            *with_border(border, self._widths, weights, self.n, points, ends, targets)
+        )
+
+    def _factorised(self, points: Array, ends: Array, targets: Array, *border: Array) -> CollocationLinearisation:
+        rule = gauss_rule(self.degree)
+        factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *border)
+        return CollocationLinearisation(self, factors)
 
     def derivative(self, x: Array, p: Array, dx: Array, dp: Array) -> Array:
         """F_x dx + F_p dp at rest, flat as the residual."""
@@ -229,7 +233,11 @@ class CollocationProblem(AbstractSmoothProblem):
         rest = self.blocks(x, p, REST)[1:]
         growing = self.blocks(x, p, Rate.of_growth(self.stored(x, p), FAST))[1:]
         mass = [(after - before) / FAST for after, before in zip(growing, rest, strict=True)]
-        return Actions(self._product(rest, 1.0), self._product(mass, 0.0))
+
+        def factors(s: float) -> CollocationLinearisation:
+            return self._factorised(*(j + s * b for j, b in zip(rest, mass, strict=True)))
+
+        return Actions(self._product(rest, 1.0), self._product(mass, 0.0), factors)
 
     def _product(self, blocks: Sequence[Array], jumps: float) -> Callable[[Array], Array]:
         """Multiplication by a matrix of these blocks (points, ends, targets), with `jumps` times the continuity rows."""

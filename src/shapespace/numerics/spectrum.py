@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shapespace.base.arrays import Array
-from shapespace.base.problem import AbstractLinearisation, AbstractSmoothProblem, Actions, Rate
+from shapespace.base.problem import AbstractLinearisation, Actions
 
 ComplexArray = NDArray[np.complex128]
 Flags = NDArray[np.bool_]
@@ -31,6 +31,8 @@ SETTLED = 1e-4
 """Ritz pairs with an estimated relative residual below this are on their way to an eigenvalue nearby."""
 BREAKDOWN = 1e-13
 """A new direction that is a smaller part of its image than this is round-off: the space is invariant."""
+NOTABLE = 0.1
+"""A new direction that is a larger part of its image needs no second orthogonalisation, which is always enough."""
 INFINITE = 1e-8
 """Eigenvalues of S smaller than this part of the largest are zero but for round-off: their rates are infinite."""
 UNSEEN = 1e-4
@@ -52,26 +54,22 @@ class Ritz(NamedTuple):
 
 @dataclass(frozen=True)
 class Pencil:
-    """J + s B at a stationary state x, factorised at s = shift."""
+    """J + s B at a stationary state, factorised at s = shift. seen (n,): weights of the problem's inner product there."""
 
-    problem: AbstractSmoothProblem
-    x: Array
-    p: Array
-    shift: float
     actions: Actions
+    shift: float
+    seen: Array
 
     @cached_property
     def linearisation(self) -> AbstractLinearisation:
         """Factors of J + shift B."""
-        rate = Rate.of_growth(self.problem.stored(self.x, self.p), self.shift)
-        return self.problem.linearise(self.x, self.p, rate)[1]
+        return self.actions.factors(self.shift)
 
     @cached_property
     def weights(self) -> Array:
         """Of the inner product: the problem's, and a little of what that does not see, so that only zero has no size."""
-        weights = self.problem.weights(self.x)
-        unseen = weights == 0.0
-        return np.where(unseen, UNSEEN / max(int(np.count_nonzero(unseen)), 1), weights)
+        unseen = self.seen == 0.0
+        return np.where(unseen, UNSEEN / max(int(np.count_nonzero(unseen)), 1), self.seen)
 
     def size(self, mode: Array | ComplexArray) -> float:
         """Norm of an increment."""
@@ -102,7 +100,7 @@ class Krylov:
     """The space spanned by powers of S on a random start: an orthonormal basis (j, n), and S in it (j + 1, j)."""
 
     def __init__(self, pencil: Pencil, capacity: int, seed: int) -> None:
-        n = len(pencil.x)
+        n = len(pencil.seen)
         self.pencil = pencil
         self.dimension = 0
         self.applications = 2
@@ -116,17 +114,20 @@ class Krylov:
         self.is_invariant = not size > 0.0
 
     def extend(self, dimension: int) -> None:
-        """Apply S until the space has this dimension, or is invariant; orthogonalised twice, which is enough."""
+        """Apply S until the space has this dimension, or is invariant."""
         while self.dimension < min(dimension, self._matrix.shape[1]) and not self.is_invariant:
             j = self.dimension
             image = self.pencil.apply(self._basis[j])
             self.applications += 1
             size, parts = self.pencil.size(image), np.zeros(j + 1)
+            rest = size
             for _ in range(2):
                 more = self._basis[: j + 1] @ (self.pencil.weights * image)
                 image -= more @ self._basis[: j + 1]
                 parts += more
-            rest = self.pencil.size(image)
+                before, rest = rest, self.pencil.size(image)
+                if rest > NOTABLE * before:
+                    break
             self._matrix[: j + 1, j] = parts
             self.dimension = j + 1
             if not rest > BREAKDOWN * size:
@@ -152,4 +153,5 @@ class Krylov:
 
     def modes(self, coefficients: ComplexArray) -> ComplexArray:
         """Increments (m, n) of coefficients (j, m) in the basis."""
-        return np.asarray(coefficients.T @ self._basis[: self.dimension])
+        basis = self._basis[: self.dimension]
+        return np.asarray(coefficients.real.T @ basis + 1j * (coefficients.imag.T @ basis))
