@@ -10,10 +10,11 @@ from tests.app.served import Stores
 from tests.shell import Shell
 
 from shapespace.app.catalogue import Catalogue
-from shapespace.app.commands import base_name, differences
+from shapespace.app.commands import differences
 from shapespace.study.branch_store import BranchStore, open_branch
+from shapespace.study.branching import branch
 from shapespace.study.curve_store import open_curve
-from shapespace.study.scenario import Scenario, scenario
+from shapespace.study.scenario import scenario
 from shapespace.study.starts import find_start
 from shapespace.study.store import RunStore
 
@@ -102,14 +103,25 @@ def test_python_runs(stores: Stores, store: int, place: str):
 
 def test_a_scenario_is_its_built_in_one_with_differences():
     given = scenario("guided-division", peclet=333.0, elements=80)
-    assert differences(given, ()) == {"peclet": 333.0, "elements": 80}
-    assert differences(given, ("peclet",)) == {"elements": 80}
+    base = scenario("guided-division")
+    assert differences(given, base) == {"peclet": 333.0, "elements": 80}
+    assert differences(given, base, ["peclet"]) == {"elements": 80}
     other = scenario("guided-division", active_tension=3.0)
-    assert differences(other, ()) == {"active_tension": 3.0}
-    own = Scenario.from_keys("my-own", given.model, dict(given.given))
-    again = scenario(base_name(own), **differences(own, ()))
-    assert again.difference(own) is None
-    assert again.run == own.run
+    assert differences(other, base) == {"active_tension": 3.0}
+
+
+def test_a_scenario_with_units_is_that_of_its_store(shell: Shell, tmp_path: Path):
+    """Its commands give results in the same units."""
+    sizes = {"length": "10 um", "energy": "1e-17 J", "time": "60 s", "concentration": "1/um^2"}
+    case = scenario("polar-swimmer", peclet=30.0, elements=20, mesh_tolerance=1e-3).in_units(**sizes)
+    made = branch(case, "peclet", stop=31.0, state="trivial", stability=False, out=tmp_path / "branch")
+    commands = proposals(Catalogue([made.store]), 0, "1")
+    assert commands["steady"].split()[2] == str(made.store)
+    say(shell, commands["steady"])
+    found = RunStore.open("results/here").scenario
+    assert found.units == case.units
+    assert found.values()["peclet"] == made.points[1].parameter
+    assert found.difference(made.scenario_at(made.points[1])) is None
 
 
 def test_numbers_name_records(stores: Stores):

@@ -316,9 +316,7 @@ def _phase(mode: ComplexArray) -> complex:
     return complex(largest.conjugate() / abs(largest))
 
 
-def _parities(
-    problem: AbstractSmoothProblem, x: Array, weights: Array, modes: ComplexArray
-) -> tuple[str | None, ...]:
+def _parities(problem: AbstractSmoothProblem, x: Array, weights: Array, modes: ComplexArray) -> tuple[str | None, ...]:
     """How the modes of a symmetric state behave under the symmetry."""
     image = problem.reflected(x)
     if image is None or weights @ (image - x) ** 2 > ALIGNED**2 * (weights @ x**2):

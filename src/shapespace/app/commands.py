@@ -2,11 +2,13 @@
 
 import os
 import shlex
-from collections.abc import Collection
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from shapespace.study.keys import MAIN_KEYS, MODELS
 from shapespace.study.plugins import VARIABLE
+from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import Scenario, scenario, scenario_names
 
 _CROSSINGS = ("pitchfork", "transcritical", "branch-point")
@@ -17,21 +19,21 @@ FURTHER = 1.25
 def continuations(
     at: Scenario,
     start: str,
+    store: AbstractRecordStore[Any],
     vary: str | None = None,
     stop: float | None = None,
     kind: str = "",
-    *,
-    exactly: bool = False,
+    changes: Mapping[str, float] = MappingProxyType({}),
 ) -> list[dict[str, Any]]:
     """Commands that go on from a stored state of a scenario, each with its words; `{vary}` and `{stop}` stand for choices.
 
-    start: the state as STORE:LABEL. vary, stop: of the branch it lies on. kind: of a special point. exactly: the stored state
-    is one nearby, so that every command must name the scenario's keys.
+    start: the state as STORE:LABEL. vary, stop: of the branch it lies on. kind: of a special point. changes: values of keys
+    here, where the stored state is one nearby.
     """
     vary = vary if vary in numeric_keys(at) else MAIN_KEYS[at.kind]
-    placed = [] if exactly else [vary]
-    changes = differences(at, placed).items()
-    words = [base_name(at), *(word for key, value in changes for word in ("-s", f"{key}={_text(value)}"))]
+    base, theirs = _base(at, store)
+    stated = {**differences(at, theirs, changes or [vary]), **changes}
+    words = [base, *(word for key, value in stated.items() for word in ("-s", f"{key}={_text(value)}"))]
     known, begins = shlex.join(words), f"--from {shlex.quote(start)}"
     program = " ".join(["shapespace", *(f"--import {shlex.quote(file)}" for file in _imports())])
     here = float(at.values()[vary])
@@ -57,8 +59,8 @@ def continuations(
     return found
 
 
-def python_of(at: Scenario, start: str, *, exactly: bool = False) -> str:
-    """Python that reads a stored state and computes on from it."""
+def python_of(start: str, changes: Mapping[str, float] = MappingProxyType({})) -> str:
+    """Python that reads a stored state and computes on from it. changes: as above."""
     lines = ["import shapespace as ss", ""]
     if files := _imports():
         lines[1:1] = [
@@ -67,11 +69,7 @@ def python_of(at: Scenario, start: str, *, exactly: bool = False) -> str:
             *(f"import_file({file!r})" for file in files),
         ]
     lines.append(f"start = ss.find_start({start!r})")
-    if exactly:
-        keys = ", ".join(f"{key}={value!r}" for key, value in differences(at, ()).items())
-        lines.append(f"scenario = ss.scenario({', '.join(filter(None, [repr(base_name(at)), keys]))})")
-    else:
-        lines.append("scenario = start.scenario")
+    lines.append("scenario = start.scenario" + (f".with_overrides({dict(changes)!r})" if changes else ""))
     lines += [
         "",
         "state = ss.steady(scenario, start=start)  # the state at rest there",
@@ -83,11 +81,10 @@ def python_of(at: Scenario, start: str, *, exactly: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
-def differences(at: Scenario, placed: Collection[str]) -> dict[str, Any]:
-    """Keys to change in the built-in scenario of this name to have this one, but for those that the start brings."""
-    model, mine = MODELS[at.model], dict(at.given)
-    theirs = dict(scenario(base_name(at)).given)
-    # Keys that the built-in one states and this one leaves to their defaults.
+def differences(at: Scenario, base: Scenario, placed: Iterable[str] = ()) -> dict[str, Any]:
+    """Keys to change in another scenario to have this one, but for those that are stated anyway."""
+    model, mine, theirs = MODELS[at.model], dict(at.given), dict(base.given)
+    # Keys that the other one states and this one leaves to their defaults.
     mine |= {key: at.values()[key] for key in theirs if key not in mine and model.rival_of(key) not in mine}
     brought = {*placed, *(model.rival_of(key) for key in placed)}
     return {key: value for key, value in mine.items() if key not in brought and theirs.get(key) != value}
@@ -99,11 +96,11 @@ def numeric_keys(at: Scenario) -> list[str]:
     return [key for key, value in values.items() if type(value) is float]
 
 
-def base_name(at: Scenario) -> str:
-    """The built-in scenario of this name; of one that came from a file, the first of its model."""
-    if at.name in scenario_names() and scenario(at.name).model == at.model:
-        return at.name
-    return next(name for name in scenario_names() if scenario(name).model == at.model)
+def _base(at: Scenario, store: AbstractRecordStore[Any]) -> tuple[str, Scenario]:
+    """What the commands begin with: the built-in scenario of this name; of one with units or from elsewhere the store."""
+    if at.units is None and at.name in scenario_names() and scenario(at.name).model == at.model:
+        return at.name, scenario(at.name)
+    return str(store.path.resolve()), store.scenario
 
 
 def _text(value: object) -> str:

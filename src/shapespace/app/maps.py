@@ -160,15 +160,18 @@ class DiagramSource(AbstractSource):
             found = self.states().state(self._place(place))
             at, frame = found.scenario, found.frame
             fields = profile_of(at, frame)
-        request = self.store().request
+        store = self.store()
+        request = store.request
+        values = request.grid.values(*self._place(place)[1:]).ravel().tolist()
         return described(
             at,
             frame,
             fields,
+            store,
             f"{self.path.resolve()}:{self.states().origin(self._place(place))}",
             vary=request.grid.x.key,
             stop=request.grid.x.stop,
-            exactly=True,
+            changes=dict(zip(request.grid.keys, values, strict=True)),
             place=place,
             title=request.labels[self._place(place)[0]],
             can_compute=True,

@@ -155,18 +155,24 @@ def quantities(at: Scenario) -> dict[str, list[str]]:
 
 
 def described(
-    at: Scenario, frame: Frame, fields: Mapping[str, Array], start: str, *, vary: str | None = None, **more: Any
+    at: Scenario,
+    frame: Frame,
+    fields: Mapping[str, Array],
+    store: AbstractRecordStore[Any],
+    start: str,
+    *,
+    vary: str | None = None,
+    **more: Any,
 ) -> dict[str, Any]:
-    """A state for the page. fields: profiles along u (m,) by name; start: where the command line finds it."""
-    proposals = {name: more.pop(name) for name in ("stop", "kind", "exactly") if name in more}
-    exactly = bool(proposals.get("exactly"))
+    """A state for the page. fields: profiles along u (m,) by name; start: where in its store the command line finds it."""
+    proposals = {name: more.pop(name) for name in ("stop", "kind", "changes") if name in more}
     return {
         "observables": finite(frame.observables),
         "velocity": number(frame.observables.get("velocity", 0.0)),
         "fields": {name: drawn(values) for name, values in fields.items() if np.isfinite(values).all()},
         "start": start,
-        "python": python_of(at, start, exactly=exactly),
-        "commands": continuations(at, start, vary, **proposals),
+        "python": python_of(start, proposals.get("changes", {})),
+        "commands": continuations(at, start, store, vary, **proposals),
         **more,
     }
 

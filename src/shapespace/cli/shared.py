@@ -56,7 +56,9 @@ StoreOrLabel = Annotated[
     str,
     Parameter(name="DIR[:LABEL]", help="Directory of a run, a branch or a curve; with --mode also a labelled point."),
 ]
-NameOrFile = Annotated[str, Parameter(name="NAME_OR_FILE", help="A built-in scenario or a TOML file.")]
+NameOrFile = Annotated[
+    str, Parameter(name="NAME_OR_FILE", help="A built-in scenario, a TOML file, or a store for its scenario.")
+]
 Settings = Annotated[
     tuple[str, ...],
     Parameter(name=["--set", "-s"], metavar="KEY=VALUE", help="Change a key of the scenario; may be repeated."),
@@ -107,9 +109,14 @@ def again(path: Path) -> str:
 
 
 def find_scenario(name_or_file: str) -> "Scenario":
-    """The built-in scenario of this name, or that of a file."""
+    """The built-in scenario of this name, or that of a file or of a store."""
+    from shapespace.study.records import holds_store
     from shapespace.study.scenario import load_scenario, scenario, scenario_names
 
+    if holds_store(Path(name_or_file)):
+        from shapespace.study.starts import stored_scenario
+
+        return stored_scenario(name_or_file)
     is_file = name_or_file.endswith(".toml") or os.sep in name_or_file or Path(name_or_file).exists()
     is_name = name_or_file in scenario_names() or not is_file
     return scenario(name_or_file) if is_name else load_scenario(name_or_file)

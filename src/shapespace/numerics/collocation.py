@@ -209,13 +209,13 @@ class CollocationProblem(AbstractSmoothProblem):
         if border is None:
             return residual, self._factorised(points, ends, targets)
         weights = gauss_rule(self.degree).weights
-        return residual, self._factorised(
-            *with_border(border, self._widths, weights, self.n, points, ends, targets)
-        )
+        return residual, self._factorised(*with_border(border, self._widths, weights, self.n, points, ends, targets))
 
     def _factorised(self, points: Array, ends: Array, targets: Array, *border: Array) -> CollocationLinearisation:
         rule = gauss_rule(self.degree)
-        factors = condensation.factorise(self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *border)
+        factors = condensation.factorise(
+            self._widths, rule.matrix, rule.weights, points, ends, targets, self.n, *border
+        )
         return CollocationLinearisation(self, factors)
 
     def derivative(self, x: Array, p: Array, dx: Array, dp: Array) -> Array:

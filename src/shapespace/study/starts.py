@@ -14,7 +14,7 @@ from shapespace.study.frame import Frame
 from shapespace.study.keys import MODELS
 from shapespace.study.records import AbstractRecordStore, noun_of
 from shapespace.study.scenario import Scenario
-from shapespace.study.search_store import open_search
+from shapespace.study.search_store import SearchStore, open_search
 from shapespace.study.store import RunStore
 
 R = TypeVar("R")
@@ -125,6 +125,18 @@ def _anchor(text: str, path: Path, label: str) -> Start:
     scenario = store.scenario.with_overrides({grid.x.key: x, grid.y.key: y})
     problem = Engine.of(scenario).problem.on_mesh(anchors.meshes[i])
     return Start(text, scenario, frame_of(problem, anchors.xs[i], {}), keys=grid.keys)
+
+
+def stored_scenario(path: str | Path) -> Scenario:
+    """The scenario that a store was computed with; of a branch, a curve and a diagram without the values that vary."""
+    # Imported late, as above.
+    from shapespace.study.diagram_store import DiagramStore
+
+    noun = noun_of(Path(path))
+    kinds = (RunStore, BranchStore, CurveStore, SearchStore, DiagramStore)
+    # What cannot be told is opened as a run, which says in a line what is wrong with it.
+    kind = next((one for one in kinds if one.noun == noun), RunStore)
+    return kind.open(path).scenario
 
 
 def find_starts(text: str | Path, scenario: Scenario) -> list[Start]:
