@@ -73,8 +73,8 @@ class Pencil:
 
     def size(self, mode: Array | ComplexArray) -> float:
         """Norm of an increment."""
-        size = np.abs(mode)
-        return float(np.sqrt(self.weights @ (size * size)))
+        squares = mode.real**2 + mode.imag**2 if np.iscomplexobj(mode) else mode * mode
+        return float(np.sqrt(self.weights @ squares))
 
     def apply(self, dx: Array) -> Array:
         """S dx = (J + shift B)^-1 B dx."""
