@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from tests.algebraic import AlgebraicProblem
 
+from shapespace.analysis import curves
 from shapespace.analysis.bifurcation import SingularPoint, locate_branch_point, locate_fold
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, Stop
@@ -140,3 +141,18 @@ def test_a_closed_curve():
             break
         last = point
     assert length == pytest.approx(2.0 * np.pi, abs=0.3)
+
+
+def test_a_zero_is_found_where_there_is_no_value(monkeypatch: pytest.MonkeyPatch):
+    """Newton fails at a singular point: what is beside it tells where it is, and elsewhere no value is no zero."""
+    monkeypatch.setattr(curves, "point_between", lambda before, after, share: share)
+
+    def failing(within: float) -> curves.Function:
+        return lambda share: np.nan if abs(share - 0.512) < within else np.sinh(share - 0.512)
+
+    for within in (1e-9, 1e-3):
+        monkeypatch.setattr(curves, "regularity", singular := failing(within))
+        assert curves.locate(0.0, 1.0, singular) == pytest.approx(0.512, abs=1e-9)
+        assert curves.locate(0.0, 1.0, failing(within)) is None
+    monkeypatch.setattr(curves, "regularity", hopeless := failing(1.0))
+    assert curves.locate(0.0, 1.0, hopeless) is None

@@ -11,10 +11,13 @@ from tests.shell import Shell
 
 from shapespace.app.catalogue import Catalogue
 from shapespace.app.commands import differences
+from shapespace.cli.shared import find_scenario
 from shapespace.study.branch_store import BranchStore, open_branch
 from shapespace.study.branching import branch
 from shapespace.study.curve_store import open_curve
-from shapespace.study.scenario import scenario
+from shapespace.study.diagram_store import DiagramStore
+from shapespace.study.run import run
+from shapespace.study.scenario import scenario, scenario_names
 from shapespace.study.starts import find_start
 from shapespace.study.store import RunStore
 
@@ -79,6 +82,30 @@ def test_a_run_goes_on_from_any_of_its_frames(shell: Shell, stores: Stores):
     first, frame = RunStore.open("results/onwards").read(0), RunStore.open(stores.run).read(2)
     assert np.array_equal(first.nodes, frame.nodes)
     assert first.observables["height"] == pytest.approx(frame.observables["height"])
+
+
+def test_a_run_with_other_keys_says_them_all(tmp_path: Path):
+    """A run brings no value of its own, and words are written as they are."""
+    case = scenario("guided-division", peclet=333.0, parameterization="lagrangian", ring_amplitude=0.0, until=1e-3)
+    made = run(case, out=tmp_path / "run")
+    for text in proposals(Catalogue([made.store]), 0, "1").values():
+        words = shlex.split(text)
+        assert words[2] == "guided-division"
+        assert {"peclet=333.0", "parameterization=lagrangian", "ring_amplitude=0.0"} <= {*words}
+
+
+@pytest.mark.parametrize("name", ["run", "branch", "map"])
+def test_a_store_stands_for_its_scenario(name: str, stores: Stores, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """But not for a built-in one whose name its folder has."""
+    path: Path = getattr(stores, name)
+    kind = {"run": RunStore, "branch": BranchStore, "map": DiagramStore}[name]
+    mine = kind.open(path).scenario
+    assert find_scenario(str(path)) == mine
+    other = next(one for one in scenario_names() if one != mine.name)
+    (tmp_path / other).symlink_to(path)
+    monkeypatch.chdir(tmp_path)
+    assert find_scenario(other) == scenario(other)
+    assert find_scenario(f"./{other}") == mine
 
 
 def test_a_point_of_a_map_is_a_start(shell: Shell, stores: Stores):

@@ -1,12 +1,15 @@
 """States of a stored diagram, computed again where they are asked for."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from shapespace.analysis.sweeping import lagrange_weights
+from shapespace.base.errors import StoreError
 from shapespace.base.outcome import Outcome
+from shapespace.study.diagram_numbers import DiagramNumbers
 from shapespace.study.diagram_state import DiagramStates
 from shapespace.study.diagram_store import CODES, DiagramStore
 from shapespace.study.diagrams import Diagram, diagram
@@ -36,14 +39,47 @@ def test_a_state_is_found_again_in_one_or_two_steps(stored: Diagram):
 def test_a_tile_without_a_state_leaves_its_neighbours_theirs(tmp_path: Path):
     """No swimmer below its onset at 22: those above are come to by steps from the middle of their own tile."""
     case = scenario("polar-swimmer", elements=20, mesh_tolerance=1e-3)
-    map_ = diagram(case, "peclet=10:40:12", "inverse_hydrodynamic_length=0.5:1:2", out=tmp_path / "onset", workers=1)
-    exists = map_.dataset["outcome"].values == CODES[Outcome.CONVERGED]
-    assert exists.any()
-    assert not exists.all()
-    states = DiagramStates(DiagramStore.open(map_.store))
-    for j, i in np.argwhere(exists):
-        velocity = float(map_.dataset["velocity"][j, i])
-        assert states.state((0, int(i), int(j))).observables["velocity"] == pytest.approx(velocity, rel=1e-7)
+    axes = ("peclet=10:40:12", "inverse_hydrodynamic_length=0.5:1:2")
+    made = diagram(case, *axes, states=("trivial", "default"), out=tmp_path / "onset", workers=1)
+    exists = made.dataset["outcome"].values == CODES[Outcome.CONVERGED]
+    assert exists[0].all()
+    assert exists[1].any()
+    assert not exists[1].all()
+    assert_found_again(made)
+
+
+@pytest.mark.slow
+def test_states_numbered_by_energy_are_found_again(tmp_path: Path):
+    """Two of them, where the anchors of one number may lie on different sheets, but none at the onset, where both are one."""
+    case = scenario("polar-swimmer", elements=20, mesh_tolerance=1e-3)
+    axes = ("peclet=18:31:10", "inverse_hydrodynamic_length=0.5:1:2")
+    made = diagram(case, *axes, states=("trivial", "default"), branches=2, out=tmp_path / "sheets", workers=1)
+    assert len(made.dataset["state"]) == 2
+    assert_found_again(made)
+
+
+def assert_found_again(made: Diagram) -> None:
+    """All states, with what is stored of them."""
+    states, data = DiagramStates(DiagramStore.open(made.store)), made.dataset
+    for number, j, i in np.argwhere(data["outcome"].values == CODES[Outcome.CONVERGED]):
+        found = states.state((int(number), int(i), int(j))).observables
+        for name in ("velocity", "pressure"):
+            stored = float(data[name][number, j, i])
+            assert abs(found[name]) == pytest.approx(abs(stored), rel=1e-6, abs=1e-7), (name, number, i, j)
+
+
+def test_damaged_numbers_are_said_in_a_line(stored: Diagram, tmp_path: Path):
+    copy = tmp_path / "copy"
+    shutil.copytree(stored.store, copy)
+    part = copy / "length" / "c" / "0" / "0"
+    part.write_bytes(part.read_bytes()[:20])
+    numbers = DiagramNumbers(DiagramStore.open(copy))
+    assert numbers.whole("area").shape == (1, 2, 76)
+    with pytest.raises(StoreError, match=r"copy: numbers in it are damaged.*--out"):
+        numbers.whole("length")
+    # The first part is that of the first tile.
+    with pytest.raises(StoreError, match=r"copy: numbers in it are damaged.*--out"):
+        numbers.at(0, 0, 0)
 
 
 def test_weights_reproduce_a_polynomial():

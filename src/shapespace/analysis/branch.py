@@ -19,7 +19,7 @@ MAX_CORRECTIONS = 4
 MAX_REFINEMENTS = 2
 """Of the solution that tells whether factors are near."""
 NEARBY = 0.1
-"""Factors stand for the Jacobian at a point where they reduce the error of any solution at least this much."""
+"""Factors stand for the Jacobian at a point where its refinements reduce the error of any solution at least this much."""
 
 
 @dataclass(frozen=True)
@@ -120,10 +120,11 @@ def _direction_nearby(plane: ExtendedProblem, X: Array, p: Array, nearby: Abstra
     """
     known = _generic(len(X), 0)
     generic = nearby.solve(known)
-    for _ in range(MAX_REFINEMENTS):
+    for refinement in range(1, MAX_REFINEMENTS + 1):
         missing = nearby.solve(known - plane.derivative(X, p, generic))
         generic = generic + missing
         if plane.norm(missing, X) <= NEARBY * plane.norm(generic, X):
+            contraction = NEARBY ** (1.0 / refinement)
             break
     else:
         return None
@@ -131,7 +132,7 @@ def _direction_nearby(plane: ExtendedProblem, X: Array, p: Array, nearby: Abstra
     for _ in range(MAX_CORRECTIONS):
         correction = nearby.solve(plane.derivative(X, p, tangent) - _last_unit(X))
         tangent = tangent - correction
-        if NEARBY * plane.norm(correction, X) <= TANGENT_ERROR:
+        if contraction * plane.norm(correction, X) <= TANGENT_ERROR:
             return Direction(tangent, _test(nearby, generic))
     return None
 

@@ -284,7 +284,7 @@ def _searched(at: Callable[[float], float], bracket: float) -> float | None:
     """A zero between 0 and 1 by the Illinois method, to a bracket of this length; None where it is not found."""
     low, high = (0.0, at(0.0)), (1.0, at(1.0))
     scale = max(abs(low[1]), abs(high[1]))
-    if not low[1] * high[1] <= 0.0:
+    if not (low[1] * high[1] <= 0.0 and scale > 0.0):
         return None
     for _ in range(60):
         share = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])

@@ -30,9 +30,11 @@ def continuations(
     start: the state as STORE:LABEL. vary, stop: of the branch it lies on. kind: of a special point. changes: values of keys
     here, where the stored state is one nearby.
     """
-    vary = vary if vary in numeric_keys(at) else MAIN_KEYS[at.kind]
     base, theirs = _base(at, store)
-    stated = {**differences(at, theirs, changes or [vary]), **changes}
+    # A point of a branch brings its value of the key; a run brings none.
+    brought = [vary] if vary is not None else []
+    vary = vary if vary in numeric_keys(at) else MAIN_KEYS[at.kind]
+    stated = {**differences(at, theirs, changes or brought), **changes}
     words = [base, *(word for key, value in stated.items() for word in ("-s", f"{key}={_text(value)}"))]
     known, begins = shlex.join(words), f"--from {shlex.quote(start)}"
     program = " ".join(["shapespace", *(f"--import {shlex.quote(file)}" for file in _imports())])
@@ -104,6 +106,8 @@ def _base(at: Scenario, store: AbstractRecordStore[Any]) -> tuple[str, Scenario]
 
 
 def _text(value: object) -> str:
+    if isinstance(value, str):
+        return value
     return str(value).lower() if isinstance(value, bool) else repr(value)
 
 

@@ -113,13 +113,15 @@ def find_scenario(name_or_file: str) -> "Scenario":
     from shapespace.study.records import holds_store
     from shapespace.study.scenario import load_scenario, scenario, scenario_names
 
-    if holds_store(Path(name_or_file)):
-        from shapespace.study.starts import stored_scenario
-
-        return stored_scenario(name_or_file)
+    # Names first: runs are stored in folders named as their scenarios.
     is_file = name_or_file.endswith(".toml") or os.sep in name_or_file or Path(name_or_file).exists()
-    is_name = name_or_file in scenario_names() or not is_file
-    return scenario(name_or_file) if is_name else load_scenario(name_or_file)
+    if name_or_file in scenario_names() or not is_file:
+        return scenario(name_or_file)
+    if name_or_file.endswith(".toml") or not holds_store(name_or_file):
+        return load_scenario(name_or_file)
+    from shapespace.study.starts import stored_scenario
+
+    return stored_scenario(name_or_file)
 
 
 def chosen_scenario(name_or_file: str, changes: Mapping[str, str], start: str | None) -> "Scenario":

@@ -1,8 +1,9 @@
 """The numbers of a stored diagram, read part by part: of a map of many points all of them take long."""
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ class DiagramNumbers:
     """
 
     def __init__(self, store: DiagramStore) -> None:
-        self._is_finished = store.outcome is not None
+        self._path, self._is_finished = store.path, store.outcome is not None
         with storage(store.path), zarr.config.set(TOGETHER):
             try:
                 group: Any = zarr.open_group(store.path, mode="r")
@@ -41,7 +42,8 @@ class DiagramNumbers:
         """An array (states, n_y, n_x)."""
         if name in self._read:
             return self._read[name]
-        values = np.asarray(self._arrays[name][...])
+        with self._reading():
+            values = np.asarray(self._arrays[name][...])
         values = values.reshape(-1, *values.shape[-2:])
         if self._is_finished:
             self._read[name] = values
@@ -61,6 +63,17 @@ class DiagramNumbers:
 
         if missing:
             # In a thread of its own, since a notebook has a loop of events in this one.
-            with ThreadPoolExecutor(1) as pool:
+            with self._reading(), ThreadPoolExecutor(1) as pool:
                 known |= zip(missing, map(float, pool.submit(asyncio.run, read()).result()), strict=True)
         return {name: known[name] for name in names}
+
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
+        """Say in a line what is wrong with the parts of arrays."""
+        with storage(self._path):
+            try:
+                yield
+            except (RuntimeError, ValueError) as error:
+                raise StoreError(
+                    f"{self._path}: numbers in it are damaged ({error}); restore it, or compute it again with another --out."
+                ) from None

@@ -1,5 +1,6 @@
 """A scenario as a problem: the model's system on a mesh, its parameters and its initial state, all dimensionless."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 
@@ -196,12 +197,12 @@ def state_of(frame: Frame) -> State:
     return State(frame.mesh, frame.nodes, frame.slopes, frame.algebraic, frame.scalars)
 
 
-def frame_of(problem: CollocationProblem, x: Array, observables: dict[str, float]) -> Frame:
+def frame_of(problem: CollocationProblem, x: Array, observables: Mapping[str, float]) -> Frame:
     """A state at rest as a frame."""
     state = problem.unpack(x)
     still = np.zeros((*state.slopes.shape[:2], 2))
     return Frame(
-        0.0, 0.0, 0.0, state.mesh, state.nodes, state.slopes, state.algebraic, state.scalars, still, observables
+        0.0, 0.0, 0.0, state.mesh, state.nodes, state.slopes, state.algebraic, state.scalars, still, dict(observables)
     )
 
 

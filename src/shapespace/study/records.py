@@ -364,7 +364,10 @@ def noun_of(path: str | Path) -> str | None:
 
 def holds_store(path: str | Path) -> bool:
     """Whether there is a manifest in this directory, whatever its state."""
-    return (Path(path) / _MANIFEST).is_file()
+    try:
+        return (Path(path) / _MANIFEST).is_file()
+    except OSError:
+        return False
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
