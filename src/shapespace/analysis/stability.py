@@ -195,8 +195,8 @@ class _Search:
         while True:
             krylov.extend(dimension)
             ritz = krylov.ritz()
-            inside = ritz.rates[: ritz.settled]
-            exact = ritz.residuals[: ritz.settled] <= CONVERGED
+            settled = ritz.settled
+            inside, exact = ritz.rates[:settled], ritz.residuals[:settled] <= CONVERGED
             radius = np.inf if krylov.is_invariant else float(abs(shift - inside[-1])) if len(inside) else 0.0
             leading, disc = _leading(inside, count), Disc(shift, radius)
             is_exact = bool(exact[leading].all() and exact[inside.real > 0.0].all())
@@ -215,7 +215,8 @@ class _Search:
 
     def _verified(self, krylov: Krylov, ritz: Ritz, leading: list[int], disc: Disc) -> _Pairs:
         """Each leading pair after one inverse iteration, with the defect it had before; a second one where that is large."""
-        pencil, rates = krylov.pencil, ritz.rates[: ritz.settled]
+        pencil, settled = krylov.pencil, ritz.settled
+        rates = ritz.rates[:settled]
         modes = krylov.modes(ritz.coefficients[:, leading])
         defects = np.zeros(len(leading))
         for i, rate in enumerate(rates[leading]):
@@ -230,9 +231,9 @@ class _Search:
                 if defects[i] <= self.options.accuracy:
                     break
             modes[i] *= _phase(modes[i]) / np.sqrt(self.weights @ np.abs(modes[i]) ** 2)
-        accuracy = np.maximum(ritz.residuals[: ritz.settled], max(self.options.accuracy, self.options.state_error))
+        accuracy = np.maximum(ritz.residuals[:settled], max(self.options.accuracy, self.options.state_error))
         accuracy[leading] = np.maximum(accuracy[leading], defects)
-        errors = np.abs(pencil.shift - rates) * krylov.conditions(ritz)[: ritz.settled] * accuracy
+        errors = np.abs(pencil.shift - rates) * krylov.conditions(ritz)[:settled] * accuracy
         return _Pairs(disc, rates, errors, leading, modes, defects)
 
     def agrees(self, pairs: _Pairs) -> bool:
@@ -282,9 +283,9 @@ def _is_rateless(krylov: Krylov) -> bool:
 
 def _leading(rates: ComplexArray, count: int) -> list[int]:
     """Indices of the `count` rates of largest real part, one more where that parted a pair."""
-    order = sorted(range(len(rates)), key=lambda i: (-rates[i].real, abs(rates[i].imag), -rates[i].imag))
+    order = np.lexsort((-rates.imag, np.abs(rates.imag), -rates.real))
     parts_a_pair = len(order) > count and rates[order[count - 1]].imag > 0.0
-    return order[: count + int(parts_a_pair)]
+    return [*map(int, order[: count + int(parts_a_pair)])]
 
 
 def _is_covered(leading: ComplexArray, disc: Disc, count: int) -> bool:
@@ -331,7 +332,11 @@ def _parities(problem: AbstractSmoothProblem, x: Array, weights: Array, modes: C
                 return name
         return None
 
-    return tuple(parity(mode) for mode in modes)
+    found: list[str | None] = []
+    for i, mode in enumerate(modes):
+        is_conjugate = i > 0 and np.array_equal(mode, modes[i - 1].conjugate())
+        found.append(found[-1] if is_conjugate and mode.imag.any() else parity(mode))
+    return tuple(found)
 
 
 def _names(

@@ -22,7 +22,8 @@ from shapespace.study.tiles import Done, Tile, compute_tile
 
 MAX_DEATHS = 3
 """Workers that one tile may cost."""
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "NPROC")
+"""Each process has one core: more threads than that wait for each other. NPROC is what XLA reads."""
 
 
 def available_cores() -> int:
