@@ -292,7 +292,8 @@ def test_the_job_script_for_slurm(monkeypatch: pytest.MonkeyPatch):
         lines = cluster.job_script().splitlines()
         address = cluster.scheduler_address
     assert lines[0].startswith("#!/")
-    assert {"#SBATCH -n 1", "#SBATCH --cpus-per-task=1", "#SBATCH -t 01:00:00", "export OMP_NUM_THREADS=1 NPROC=1"} <= {*lines}
+    assert {"#SBATCH -n 1", "#SBATCH --cpus-per-task=1", "#SBATCH -t 01:00:00"} <= {*lines}
+    assert "export OMP_NUM_THREADS=1 NPROC=1" in lines
     assert [line for line in lines if re.fullmatch(r"#SBATCH --mem=[12]G", line)]
     (start,) = [line for line in lines if "dask_worker" in line]
     assert start.startswith(f"{sys.executable} -m distributed.cli.dask_worker {address} ")
