@@ -60,12 +60,12 @@ def branch_command(
     ] = None,
     settings: Settings = (),
     origin: StartFrom = None,
-    state: Annotated[str | None, Parameter(metavar="NAME", help="Start from the default or the trivial state.")] = None,
+    state: Annotated[str | None, Parameter(metavar="NAME", help="Start from this state: default, trivial; of vesicles prolate, oblate, stomatocyte.")] = None,
     side: Annotated[
         int, Parameter(metavar="1|-1|0", help="From a branch point: the other branch to one or the other side.")
     ] = 0,
     both: Annotated[bool, Parameter(help="Also the other way from A, as far as B is on this side.")] = False,
-    no_stability: Annotated[bool, Parameter(help="Without growth rates, in about half the time.")] = False,
+    no_stability: Annotated[bool, Parameter(help="Without growth rates, in about a third of the time.")] = False,
     out: Annotated[
         Path | None, Parameter(metavar="DIR", help="New directory; the default is results/NAME-KEY.")
     ] = None,

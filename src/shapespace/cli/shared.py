@@ -51,10 +51,10 @@ app = App(
     default_parameter=Parameter(negative=(), show_default=False),
 )
 
-Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run, as `shapespace` made it.")]
+Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run or a branch, as `shapespace` made it.")]
 StoreOrLabel = Annotated[
     str,
-    Parameter(name="DIR[:LABEL]", help="Directory of a run, a branch or a curve; with --mode also a labelled point."),
+    Parameter(name="DIR[:LABEL]", help="Directory of any store; of a branch or a curve also a labelled point."),
 ]
 NameOrFile = Annotated[
     str, Parameter(name="NAME_OR_FILE", help="A built-in scenario, a TOML file, or a store for its scenario.")
