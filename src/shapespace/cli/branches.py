@@ -60,7 +60,12 @@ def branch_command(
     ] = None,
     settings: Settings = (),
     origin: StartFrom = None,
-    state: Annotated[str | None, Parameter(metavar="NAME", help="Start from this state: default, trivial; of vesicles prolate, oblate, stomatocyte.")] = None,
+    state: Annotated[
+        str | None,
+        Parameter(
+            metavar="NAME", help="Start from this state: default, trivial; of vesicles prolate, oblate, stomatocyte."
+        ),
+    ] = None,
     side: Annotated[
         int, Parameter(metavar="1|-1|0", help="From a branch point: the other branch to one or the other side.")
     ] = 0,
