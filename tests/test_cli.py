@@ -17,9 +17,13 @@ from tests.shell import Shell, one_complaint
 from tests.study.fakes import STEPS, FakeSimulation, install
 
 from shapespace.base.outcome import Outcome
+from shapespace.study import dataset as dataset_module
 from shapespace.study import files
+from shapespace.study import tables as tables_module
 from shapespace.study.scenario import load_scenario, scenario, scenario_names, template
 from shapespace.study.store import RunStore
+from shapespace.view import figure as figure_module
+from shapespace.view import show as show_module
 
 ROOT = Path(__file__).resolve().parents[1]
 COMMANDS = ("scenarios", "config", "run", "steady", "branch", "plot", "movie", "export", "check", "verify")
@@ -178,7 +182,6 @@ def test_bad_input_is_one_line_and_writes_nothing(shell: Shell, arguments: list[
     ],
 )
 def test_other_bad_input_is_one_line_too(shell: Shell, arguments: list[str], part: str):
-    pytest.importorskip("shapespace.study.dataset")
     assert part in one_complaint(shell(*arguments))
     assert not [*Path().iterdir()]
 
@@ -305,11 +308,8 @@ def test_help_loads_no_numerical_library():
 
 
 def test_pictures_and_export_go_where_they_are_wanted(shell: Shell, monkeypatch: pytest.MonkeyPatch):
-    dataset_module = pytest.importorskip("shapespace.study.dataset")
-    figure_module = pytest.importorskip("shapespace.view.figure")
-    show_module = pytest.importorskip("shapespace.view.show")
     dataset = xr.Dataset({"height": ("time", [1.0, 2.0])})
-    for module in (dataset_module, pytest.importorskip("shapespace.study.tables")):
+    for module in (dataset_module, tables_module):
         monkeypatch.setattr(module, "open_dataset", lambda _: dataset)
     monkeypatch.setattr(figure_module, "plot_run", lambda _: Figure())
     monkeypatch.setattr(show_module, "movie", lambda _store, path, _progress: path)
@@ -329,7 +329,6 @@ def test_pictures_and_export_go_where_they_are_wanted(shell: Shell, monkeypatch:
 
 
 def test_check_reports_line_by_line(shell: Shell, fake: type[FakeSimulation]):
-    pytest.importorskip("shapespace.view.movie")
     lines = shell("check").out.splitlines()
     assert [line.partition(": ")[0].split(maxsplit=1)[1] for line in lines] == [
         "versions", "double precision", "small solve", "writing", "cores", "cache", "accelerator", "movie writer", "cluster",

@@ -4,6 +4,7 @@ import json
 import re
 from pathlib import Path
 
+import distributed
 import numpy as np
 import pytest
 import xarray as xr
@@ -61,7 +62,6 @@ def test_diagram_maps_and_draws_swimmers(shell: Shell):
 
 def test_a_cluster_that_cannot_help_is_one_line(shell: Shell, monkeypatch: pytest.MonkeyPatch):
     """No scheduler, and a worker with another version of the package: nothing is written."""
-    distributed = pytest.importorskip("distributed")
     monkeypatch.setattr("shapespace.study.cluster.SECONDS", 0.5)
     command = (*COMMAND[:-2], *AXES, "--out", "map", "--dask")
     assert "no scheduler answers there" in one_complaint(shell(*command, "tcp://127.0.0.1:9"))

@@ -47,6 +47,7 @@ def browser() -> "Iterator[Browser]":
     from tests.app.browser import PROGRAM, chromium
 
     if PROGRAM is None:
+        # No package of Python's brings a browser, and all but these tests do without.
         pytest.skip("needs Chromium (Debian: apt install chromium)")
     with chromium() as found:
         yield found

@@ -4,6 +4,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from types import ModuleType
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -39,8 +40,8 @@ class FakeSimulation:
     stops_at: int | None = None
     raises: BaseException | None = None
     pause: float = 0.0
-    observables: dict[str, float] = {}  # noqa: RUF012  # replaced as a whole, never changed
-    starts: list[tuple[Scenario, list[float]]] = []  # noqa: RUF012  # cleared for each test by `install`
+    observables: ClassVar[dict[str, float]] = {}
+    starts: ClassVar[list[tuple[Scenario, list[float]]]] = []
 
     def __init__(self, scenario: Scenario, history: Sequence[Frame] = (), start: Frame | None = None) -> None:
         del start

@@ -1,10 +1,13 @@
 """States of a stored diagram, computed again where they are asked for."""
 
+import json
 import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import zarr
 
 from shapespace.analysis.sweeping import lagrange_weights
 from shapespace.base.errors import StoreError
@@ -80,6 +83,20 @@ def test_damaged_numbers_are_said_in_a_line(stored: Diagram, tmp_path: Path):
     # The first part is that of the first tile.
     with pytest.raises(StoreError, match=r"copy: numbers in it are damaged.*--out"):
         numbers.at(0, 0, 0)
+
+
+def test_numbers_of_an_unfinished_map_are_read_anew(stored: Diagram, tmp_path: Path):
+    """Those of a finished one are kept."""
+    for name, fields, again in (("finished", {}, False), ("running", {"outcome": None, "status": "running"}, True)):
+        copy = tmp_path / name
+        shutil.copytree(stored.store, copy)
+        manifest = json.loads((copy / "store.json").read_text())
+        (copy / "store.json").write_text(json.dumps(manifest | fields))
+        numbers = DiagramNumbers(DiagramStore.open(copy))
+        before = numbers.whole("length").copy()
+        array: Any = zarr.open_group(copy, mode="r+")["length"]
+        array[...] = before.reshape(array.shape) + 1.0
+        assert np.array_equal(numbers.whole("length"), before + again)
 
 
 def test_weights_reproduce_a_polynomial():

@@ -11,6 +11,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+import dask_jobqueue
+import distributed
 import numpy as np
 import pytest
 import xarray as xr
@@ -265,7 +267,6 @@ def test_a_killed_client_leaves_no_process_and_loses_nothing(name: str, request:
 
 
 def test_a_cluster_gives_the_same_map(stored: Diagram, tmp_path: Path):
-    distributed = pytest.importorskip("distributed")
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": False, "dashboard_address": ":0"}
     tiles, done = without(stored, tmp_path / "d", [(0, 1), (1, 1)]), list[Done]()
     with distributed.LocalCluster(**options) as cluster:
@@ -277,8 +278,7 @@ def test_a_cluster_gives_the_same_map(stored: Diagram, tmp_path: Path):
 
 def slurm_cluster(monkeypatch: pytest.MonkeyPatch) -> Any:
     """The cluster of the page on maps, which submits nothing."""
-    jobqueue = pytest.importorskip("dask_jobqueue")
-    monkeypatch.setattr(jobqueue.SLURMCluster, "scale", lambda self, jobs: None)
+    monkeypatch.setattr(dask_jobqueue.SLURMCluster, "scale", lambda self, jobs: None)
     page = Path(__file__).parents[2] / "docs" / "how-to" / "map-shape-space.md"
     (block,) = [one.text for one in blocks_of(page) if "SLURMCluster" in one.text]
     names: dict[str, Any] = {}
@@ -317,7 +317,6 @@ def test_a_job_of_the_script_computes_a_map(stored: Diagram, tmp_path: Path, mon
 
 
 def test_no_scheduler_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    pytest.importorskip("distributed")
     monkeypatch.setattr("shapespace.study.cluster.SECONDS", 0.5)
     for address in ("tcp://127.0.0.1:9", "nonsense://x"):
         with pytest.raises(InputError, match="no scheduler answers"):

@@ -13,14 +13,18 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from shapespace.analysis import sweeping
+from shapespace.analysis.stationary import Stationary
+from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError, StoreError, WorkerError
 from shapespace.base.outcome import Outcome
+from shapespace.base.problem import AbstractProblem
+from shapespace.numerics.newton import Root
 from shapespace.study.diagram_store import Diagram, DiagramStore, open_diagram
 from shapespace.study.diagrams import diagram
 from shapespace.study.scenario import Scenario, scenario
@@ -81,11 +85,11 @@ def test_a_point_that_never_converges(undisturbed: Diagram, tmp_path: Path, monk
     at = undisturbed.request.grid.values(6, 7).reshape(2)
     solved, stepped = sweeping.solve_root, sweeping.step_to
 
-    def stubborn(problem, x, p, *rest):  # type: ignore[no-untyped-def]
+    def stubborn(problem: AbstractProblem, x: Array, p: Array, *rest: Any) -> Root:
         root = solved(problem, x, p, *rest)
         return replace(root, outcome=Outcome.MAX_ITERATIONS) if np.array_equal(p, at) else root
 
-    def nowhere(start, p, *rest):  # type: ignore[no-untyped-def]
+    def nowhere(start: Stationary, p: Array, *rest: Any) -> Stationary:
         found = stepped(start, p, *rest)
         return replace(found, outcome=Outcome.NOT_REACHED) if np.array_equal(p, at) else found
 
@@ -213,7 +217,6 @@ class Daemons(NamedTuple):
 
 @pytest.fixture
 def daemons(tmp_path: Path) -> Iterator[Daemons]:
-    pytest.importorskip("distributed")
     started, file = [], tmp_path / "scheduler.json"
 
     def start(kind: str, *arguments: str) -> subprocess.Popen[bytes]:

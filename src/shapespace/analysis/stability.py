@@ -266,7 +266,7 @@ class _Search:
             rates=rates,
             modes=pairs.modes,
             errors=pairs.errors[pairs.leading],
-            parities=_parities(self.problem, self.x, self.weights, pairs.modes),
+            parities=_parities(self.problem, self.x, self.weights, rates, pairs.modes),
             neutral=names,
             n_unstable=unstable,
             disc=pairs.disc,
@@ -285,7 +285,8 @@ def _leading(rates: ComplexArray, count: int) -> list[int]:
     """Indices of the `count` rates of largest real part, one more where that parted a pair."""
     order = np.lexsort((-rates.imag, np.abs(rates.imag), -rates.real))
     parts_a_pair = len(order) > count and rates[order[count - 1]].imag > 0.0
-    return [*map(int, order[: count + int(parts_a_pair)])]
+    found: list[int] = order[: count + int(parts_a_pair)].tolist()
+    return found
 
 
 def _is_covered(leading: ComplexArray, disc: Disc, count: int) -> bool:
@@ -317,7 +318,9 @@ def _phase(mode: ComplexArray) -> complex:
     return complex(largest.conjugate() / abs(largest))
 
 
-def _parities(problem: AbstractSmoothProblem, x: Array, weights: Array, modes: ComplexArray) -> tuple[str | None, ...]:
+def _parities(
+    problem: AbstractSmoothProblem, x: Array, weights: Array, rates: ComplexArray, modes: ComplexArray
+) -> tuple[str | None, ...]:
     """How the modes of a symmetric state behave under the symmetry."""
     image = problem.reflected(x)
     if image is None or weights @ (image - x) ** 2 > ALIGNED**2 * (weights @ x**2):
@@ -333,9 +336,9 @@ def _parities(problem: AbstractSmoothProblem, x: Array, weights: Array, modes: C
         return None
 
     found: list[str | None] = []
-    for i, mode in enumerate(modes):
-        is_conjugate = i > 0 and np.array_equal(mode, modes[i - 1].conjugate())
-        found.append(found[-1] if is_conjugate and mode.imag.any() else parity(mode))
+    for rate, mode in zip(rates, modes, strict=True):
+        # The second mode of a pair is the conjugate of the first.
+        found.append(found[-1] if rate.imag < 0.0 else parity(mode))
     return tuple(found)
 
 

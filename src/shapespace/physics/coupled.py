@@ -82,7 +82,7 @@ def _name(function: Callable[..., Traced], name: str, arguments: tuple[str, ...]
     function.__name__ = name
     keyword = inspect.Parameter.KEYWORD_ONLY
     unique = dict.fromkeys(arguments)
-    function.__signature__ = inspect.Signature([inspect.Parameter(one, keyword) for one in unique])  # type: ignore[attr-defined]  # inspect reads it
+    vars(function)["__signature__"] = inspect.Signature([inspect.Parameter(one, keyword) for one in unique])
 
 
 def _form(

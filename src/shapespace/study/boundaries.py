@@ -21,6 +21,7 @@ from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.study.curve_store import Curve, outline
 from shapespace.study.curves import curve_through
+from shapespace.study.diagram_state import DiagramStates
 from shapespace.study.diagram_store import (
     BOUNDARIES,
     CURVES,
@@ -32,9 +33,9 @@ from shapespace.study.diagram_store import (
     kind_codes,
 )
 from shapespace.study.files import storage, write_atomically
+from shapespace.study.grid import Grid
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.regimes import SHAPE
-from shapespace.study.tiles import find_state
 
 NEAR = 1.0
 """Cells from the middle between two points of different kind within which a curve tells where between them it changes."""
@@ -77,11 +78,11 @@ def follow_boundaries(store: DiagramStore, diagram: Diagram, progress: Progress 
     with storage(store.path):
         folder.mkdir(exist_ok=True)
     curves = _kept(folder, diagram)
-    open_changes = _unexplained(find_changes(diagram), diagram, curves)
+    open_changes, states = _unexplained(find_changes(diagram), diagram, curves), DiagramStates(store)
     tried: list[Array] = []
     while open_changes and len(tried) < MAX_FAILURES:
         change = max(open_changes, key=lambda one: _remoteness(one.middle, tried, diagram))
-        found = _curve_at(store, diagram, change, curves, folder)
+        found = _curve_at(states, diagram, change, curves, folder)
         if found is None:
             tried.append(change.middle)
             continue
@@ -188,13 +189,13 @@ def _unexplained(changes: Sequence[Change], diagram: Diagram, curves: Sequence[C
 
 
 def _curve_at(
-    store: DiagramStore, diagram: Diagram, change: Change, curves: Sequence[Curve], folder: Path
+    states: DiagramStates, diagram: Diagram, change: Change, curves: Sequence[Curve], folder: Path
 ) -> Curve | None:
     """The curve that a change lies on; None where there is no fold or branch point, or one of a known curve."""
-    grid = store.request.grid
+    grid = diagram.request.grid
     moved = 0 if change.inside[1] == change.outside[1] else 1
     axis, other = (grid.x, grid.y) if moved == 0 else (grid.y, grid.x)
-    point = _point_at(store, diagram, change, moved)
+    point = _point_at(states, grid, change, moved)
     if point is None or not axis.start <= point.parameter <= axis.stop:
         return None
     place = np.array([[(point.parameter - axis.start) / axis.step, change.inside[1 - moved]]])
@@ -205,13 +206,12 @@ def _curve_at(
     values = dict(zip((axis.key, other.key), point.p.tolist(), strict=True))
     origin = f"{point.kind} of the diagram at {', '.join(f'{key} = {value:.8g}' for key, value in values.items())}"
     bounds = ((axis.start, axis.stop), (other.start, other.stop))
-    scenario = store.scenario.with_overrides(values)
+    scenario = diagram.scenario.with_overrides(values)
     return curve_through(scenario, point, bounds, folder / f"{point.kind}-{number}", origin)
 
 
-def _point_at(store: DiagramStore, diagram: Diagram, change: Change, moved: int) -> SingularPoint | None:
+def _point_at(states: DiagramStates, grid: Grid, change: Change, moved: int) -> SingularPoint | None:
     """The fold or branch point at a change along key number `moved`, from its inside or, where that is singular, from behind."""
-    grid = store.request.grid
     axis, other = (grid.x, grid.y) if moved == 0 else (grid.y, grid.x)
     ahead = change.outside[moved] - change.inside[moved]
     for back in range(2):
@@ -221,11 +221,11 @@ def _point_at(store: DiagramStore, diagram: Diagram, change: Change, moved: int)
             break
         # The last ones are the likeliest: what a fold ends are, of several states, those of more energy.
         for number in reversed(change.states):
-            state = find_state(store, diagram, number, (at[0], at[1]))
+            state = states.find((number, at[0], at[1]))
             point = (
                 None
                 if state is None
-                else locate(state, (axis.key, other.key), moved, ahead * axis.step, change.is_pair)
+                else locate(state.found, (axis.key, other.key), moved, ahead * axis.step, change.is_pair)
             )
             if point is not None:
                 return point

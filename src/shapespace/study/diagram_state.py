@@ -1,6 +1,7 @@
 """The state at a point of a stored diagram, which holds numbers only: computed again from what is known nearby."""
 
 from collections import OrderedDict
+from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
@@ -11,11 +12,11 @@ from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.diagram_numbers import DiagramNumbers
-from shapespace.study.diagram_store import CODES, OUTCOME, Diagram, DiagramStore
+from shapespace.study.diagram_store import CODES, OUTCOME, DiagramStore
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.scenario import Scenario
 from shapespace.study.steady import Steady
-from shapespace.study.tiles import TELLING, Surveyor, find_state
+from shapespace.study.tiles import Surveyor, states_again
 
 KEPT = 64
 """States to go on from: those beside a known one are a few Newton steps away."""
@@ -24,7 +25,8 @@ BLOCK = 4
 SHORTEST = 1.0 / 16.0
 """Of the way from a known state that is worth a step, before the tile is computed again."""
 _CHECKED = ("area", "length")
-"""Of a state that is computed again, against what is stored."""
+TELLING = 1e-6
+"""States that differ by less in these, relative to them, are the same."""
 
 Place = tuple[int, int, int]
 """Number of the state, and of the values along x and y."""
@@ -36,7 +38,6 @@ class DiagramStates:
     def __init__(self, store: DiagramStore, numbers: DiagramNumbers | None = None) -> None:
         self._store, self._scenario, self._request = store, store.scenario, store.request
         self._numbers = numbers or DiagramNumbers(store)
-        self._diagram = Diagram(self._scenario, self._request, store.path)
         self._grid = grid = self._request.grid
         self._number = {tile: position for position, tile in enumerate(grid.tiles)}
         self._anchors = [*store]
@@ -52,28 +53,45 @@ class DiagramStates:
 
     def state(self, place: Place) -> Steady:
         """The state at a point. InputError where the diagram has none, StoreError where it is not found again."""
+        if not self._has(place):
+            raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
+        found = self.find(place)
+        if found is None:
+            raise StoreError(f"{self._store.path}: the state at this point was not found again; resume the diagram.")
+        return found
+
+    def find(self, place: Place) -> Steady | None:
+        """The state at a point, None where the diagram has none or it is not found again."""
         if place not in self._known:
-            self._known[place] = self._again(place)
+            again = self._again(place) if self._has(place) else None
+            if again is None:
+                return None
+            self._known[place] = again
         self._known.move_to_end(place)
         if len(self._known) > KEPT:
             self._known.popitem(last=False)
         return self._known[place]
 
-    def _again(self, place: Place) -> Steady:
-        """The state at a point, computed again."""
-        stored = self._numbers.at(*place, (OUTCOME, *_CHECKED))
-        if stored[OUTCOME] != CODES[Outcome.CONVERGED]:
-            raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
-        scenario = self.scenario_at(place)
-        for way in (self._interpolated, self._stepped, self._swept):
-            found = way(place)
+    def _has(self, place: Place) -> bool:
+        return place in self._known or self._numbers.at(*place, [OUTCOME])[OUTCOME] == CODES[Outcome.CONVERGED]
+
+    def _again(self, place: Place) -> Steady | None:
+        """The state at a point, computed again and recognised by what is stored of it; None where it is not found."""
+        scenario, stored = self.scenario_at(place), self._numbers.at(*place, _CHECKED)
+        for found in self._tried(place):
             if found is not None and found.outcome.is_success:
                 assert isinstance(found.problem, KeyedProblem)
                 steady = Steady(scenario, found.problem, found)
                 mine = steady.observables
                 if all(abs(mine[name] - stored[name]) <= TELLING * abs(mine[name]) for name in _CHECKED):
                     return steady
-        raise StoreError(f"{self._store.path}: the state at this point was not found again; resume the diagram.")
+        return None
+
+    def _tried(self, place: Place) -> Iterator[Stationary | None]:
+        """What may be the state at a point, the cheapest first."""
+        yield self._interpolated(place)
+        yield self._stepped(place)
+        yield from states_again(self._store, place[0], place[1:])
 
     def anchor(self, place: Place) -> int | None:
         """The number of the nearest tile in whose middle the state is stored, None where there is none."""
@@ -134,10 +152,6 @@ class DiagramStates:
             start = self._surveyor.state(anchors.meshes[number], anchors.xs[number], values)
         goal = self._grid.values(*place[1:]).reshape(2)
         return step_to(start, goal, SWEEP_NEWTON, SHORTEST) if not np.array_equal(start.p, goal) else start
-
-    def _swept(self, place: Place) -> Stationary | None:
-        """As the diagram itself came there."""
-        return find_state(self._store, self._diagram, place[0], place[1:])
 
     @staticmethod
     def _distance(one: tuple[int, int], place: Place) -> int:

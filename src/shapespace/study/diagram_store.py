@@ -185,7 +185,7 @@ class DiagramStore(AbstractRecordStore[Anchors]):
     def _disorder(self, previous: Anchors, record: Anchors) -> str | None:
         return None
 
-    @property
+    @cached_property
     def request(self) -> DiagramRequest:
         """What was asked for."""
         return DiagramRequest.from_dict(self.manifest[self.noun])

@@ -59,7 +59,7 @@ def decode_frame(data: bytes) -> Frame:
 def write_arrays(arrays: Mapping[str, NDArray[Any]]) -> bytes:
     """A zip archive of arrays with the CRC of each."""
     buffer = io.BytesIO()
-    np.savez(buffer, **arrays)  # type: ignore[arg-type]  # numpy's own flag is not among the names
+    np.savez(buffer, allow_pickle=False, **arrays)
     return buffer.getvalue()
 
 

@@ -168,7 +168,8 @@ def typed(key: str, value: object, model: str) -> Value:
         return _read_text(key, value, MODELS[model].type_of(key))
     # NumPy's numbers are numbers; its bool_ has no place in numbers.Real and is left to fail the check.
     if isinstance(value, bool) or not isinstance(value, Real):
-        return value  # type: ignore[return-value]  # the record's own check speaks about it
+        # What is of no such type goes on as it is, because the record that it is for says best what it takes.
+        return value  # type: ignore[return-value]
     if isinstance(value, Integral) and MODELS[model].type_of(key) is not float:
         return int(value)
     try:

@@ -25,7 +25,6 @@ from shapespace.study.diagram_store import (
     REGIME,
     UNSTABLE,
     Anchors,
-    Diagram,
     DiagramStore,
     kind_codes,
 )
@@ -36,9 +35,6 @@ from shapespace.study.quadtree import Lines, QuadTree
 from shapespace.study.regimes import regime_of
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
-
-TELLING = 1e-6
-"""States whose area and length differ by less, relative to them, are the same."""
 
 Tile = tuple[int, int]
 
@@ -222,8 +218,11 @@ def _sweep(
     return sweep
 
 
-def find_state(store: DiagramStore, diagram: Diagram, number: int, at: Index) -> Stationary | None:
-    """A state of the diagram at a grid point, computed again from the anchor of its tile; None where there is none."""
+def states_again(store: DiagramStore, number: int, at: Index) -> Iterator[Stationary]:
+    """States at a grid point, computed as the diagram was: from the anchor of its tile by a few points, then in the whole tile.
+
+    number: of the state; of a diagram of all states they are all looked for.
+    """
     grid, is_strict = store.request.grid, store.request.branches > 0
     surveyor = Surveyor(store.scenario, grid.keys, stability=False)
     tile = grid.tile_of(at)
@@ -240,12 +239,11 @@ def find_state(store: DiagramStore, diagram: Diagram, number: int, at: Index) ->
         if sweep.begin(start, state):
             sweep.spread(start)
         found = sweep.found.get((at[0] - int(low[0]), at[1] - int(low[1])))
-        if found is not None and surveyor.is_stored(found, diagram, number, at):
-            return found
+        if found is not None:
+            yield found
     x, y = grid.span(tile)
     sweeps = _sheets(store, surveyor, tile) if is_strict else [_sweep(store, surveyor, store.read(number), tile)]
-    states = states_at(sweeps, (at[0] - x.start, at[1] - y.start))
-    return next((one for one in states if surveyor.is_stored(one, diagram, number, at)), None)
+    yield from states_at(sweeps, (at[0] - x.start, at[1] - y.start))
 
 
 def _around(tile: Tile) -> Iterator[Tile]:
@@ -328,15 +326,6 @@ class Surveyor:
         for name, value in values.items():
             out[name][at] = value
         return spectrum
-
-    def is_stored(self, state: Stationary, diagram: Diagram, number: int, at: Index) -> bool:
-        """Whether a state is that of a diagram."""
-        x, y = self.keys
-        there = diagram.dataset.isel(
-            {x: at[0], y: at[1], **({"state": number} if "state" in diagram.dataset.dims else {})}
-        )
-        mine = self._in_units(state, self.measured(state))
-        return all(abs(mine[name] - float(there[name])) <= TELLING * abs(mine[name]) for name in ("area", "length"))
 
     def measured(self, state: Stationary) -> dict[str, float]:
         """Dimensionless observables."""

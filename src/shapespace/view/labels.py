@@ -20,7 +20,6 @@ def label_points(axes: Axes, labels: Sequence[tuple[str, float, float]]) -> None
     figure = axes.get_figure(root=True)
     assert figure is not None
     figure.draw_without_rendering()  # settles the limits
-    renderer = figure.canvas.get_renderer()  # type: ignore[attr-defined]  # that of Agg has one
     taken = _drawn(axes)
     for text, x, y in labels:
         best, fewest, box = None, np.inf, None
@@ -35,7 +34,7 @@ def label_points(axes: Axes, labels: Sequence[tuple[str, float, float]]) -> None
                     va="bottom" if up > 0 else "top",
                     fontsize=SIZE,
                 )
-                place = note.get_window_extent(renderer).padded(2.0)
+                place = note.get_window_extent().padded(2.0)
                 covered = _covered(place, taken) + len(taken) * (not _is_within(place, axes.bbox))
                 if covered < fewest:
                     if best is not None:

@@ -1,5 +1,6 @@
 """The movie of a run: the moving surface beside its curve over time."""
 
+import io
 import os
 import shutil
 import subprocess
@@ -171,7 +172,6 @@ class Scene:
     def _draw_still(self, layout: Layout, dpi: int) -> Axes:
         """Draw what does not move, make it the backdrop, and return the axes of the curve."""
         still = Figure(figsize=INCHES, dpi=dpi)
-        canvas = FigureCanvasAgg(still)
         run, camera = self._run, self._camera
         surface = still.add_axes(_SURFACE_BOX)
         prepare_snapshot_axes(surface, self._limits)
@@ -186,8 +186,7 @@ class Scene:
         self._clocks = [Clock(still, self.figure, run.dataset["time"], 0.88, 17, style.INK, self._early)]
         if self._swims:
             self._clocks.append(Clock(still, self.figure, run.dataset["velocity"], 0.79, 13, style.GREEN))
-        canvas.draw()  # type: ignore[no-untyped-call]  # of matplotlib
-        self.figure.add_artist(Backdrop(np.array(canvas.buffer_rgba())))  # type: ignore[no-untyped-call]  # of matplotlib
+        self.figure.add_artist(Backdrop(_pixels(still)))
         return curve
 
     def _draw_flow_key(self, surface: Axes) -> Text | None:
@@ -236,6 +235,15 @@ def _smoothed(flows: Array) -> Array:
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(flows, 2 * half, mode="edge"), 2 * half + 1)
     windows = np.lib.stride_tricks.sliding_window_view(windows.max(axis=-1), 2 * half + 1)
     return np.asarray(windows.mean(axis=-1), dtype=np.float64)
+
+
+def _pixels(figure: Figure) -> NDArray[np.uint8]:
+    """A picture of a figure, (height, width, 4)."""
+    picture = io.BytesIO()
+    with mpl.rc_context({"savefig.bbox": None}):
+        figure.savefig(picture, format="rgba", dpi=figure.dpi)
+    width, height = figure.canvas.get_width_height()
+    return np.frombuffer(picture.getvalue(), np.uint8).reshape(height, width, 4)
 
 
 class Backdrop(Artist):

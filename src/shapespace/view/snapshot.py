@@ -281,8 +281,7 @@ class SnapshotArtists:
             self._mesh.remove()
         triangulation = Triangulation(surface.vertices[:, 0], surface.vertices[:, 1], surface.triangles)
         self._mesh = TriMesh(triangulation, zorder=2)
-        self._mesh.set_facecolor(surface.colours)  # type: ignore[arg-type]  # the stubs know no array of colours
-        self._mesh.set_rasterized(True)
+        self._mesh.set(facecolor=surface.colours, rasterized=True)
         self._axes.add_collection(self._mesh, autolim=False)
         self._outline.set_segments(silhouette(profile, self.camera, offset))
         _set_arrows(self.flow, *velocity_arrows(profile, self.camera, offset), self.camera.shortest_arrow)
