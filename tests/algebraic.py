@@ -66,6 +66,7 @@ class AlgebraicProblem(AbstractSmoothProblem):
             lambda dx: self.derivative(x, p, dx, np.zeros_like(p)),
             lambda dx: -dx,
             lambda s: self.linearise(x, p, Rate.of_growth(self.stored(x, p), s))[1],
+            np.full(len(x), True),
         )
 
     def weights(self, x: Array) -> Array:

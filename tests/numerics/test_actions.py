@@ -36,7 +36,18 @@ def test_products_are_derivatives(case: str):
     dq = (problem.stored(x + e * dx, p) - problem.stored(x - e * dx, p)) / (2.0 * e)
     by_difference = (problem.residual(x, p, Rate(0.0, e * dq)) - problem.residual(x, p, Rate(0.0, -e * dq))) / (2.0 * e)
     np.testing.assert_allclose(actions.mass(dx), by_difference, rtol=1e-7, atol=1e-7 * np.abs(by_difference).max())
+    assert not actions.mass(np.where(actions.moving, 0.0, dx)).any()
     shift = 7.0
     factors = actions.factors(shift)
     np.testing.assert_allclose(factors.solve(actions.jacobian(dx) + shift * actions.mass(dx)), dx, rtol=0.0, atol=1e-9)
     assert factors.sign == problem.linearise(x, p, Rate.of_growth(problem.stored(x, p), shift))[1].sign
+
+
+def test_the_mass_of_a_surface_acts_on_what_is_stored():
+    """Coordinates, the concentration and the scale h; not on angles, curvatures, tensions and velocities."""
+    problem, x, p = surface("guided-division")
+    moving = problem.unpack(problem.actions(x, p).moving.astype(float))
+    expected = [name in ("r", "z", "c") for name in problem.system.fields]
+    assert np.array_equal(moving.nodes, np.broadcast_to(expected, moving.nodes.shape))
+    assert np.array_equal(moving.slopes, np.broadcast_to(expected, moving.slopes.shape))
+    assert np.array_equal(moving.scalars, [name == "h" for name in problem.system.scalars])

@@ -11,6 +11,7 @@ import pytest
 
 import shapespace as ss
 from shapespace.base.errors import InputError
+from shapespace.study.searching import search_states
 from shapespace.view.notebook import Animation, outline_svg
 from shapespace.view.show import film_of
 
@@ -94,6 +95,15 @@ def test_a_film_of_a_branch_goes_along_its_key_or_along_its_arc(stores: Path):
     film = film_of(turned)
     np.testing.assert_array_equal(film["time"], [point.place for point in points])
     assert film["time"].attrs["words"] == "arclength"
+
+
+def test_a_search_shows_its_states():
+    found = search_states(ss.scenario("polar-swimmer", elements=20, peclet=24), max_tries=3)
+    text = shown(found)
+    assert f"{len(found.states)} new state" in text
+    for state in found.states:
+        assert f"{state.label} " in text
+        assert f"{state.growth_rates[0][0]:.6g}" in text
 
 
 def test_states_and_failures_show_what_they_are():

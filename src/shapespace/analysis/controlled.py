@@ -77,11 +77,12 @@ class ControlledProblem(AbstractSmoothProblem):
 
     def actions(self, x: Array, p: Array) -> Actions:
         """Of the inner problem; the condition holds at once."""
-        mass, still = self.inner.actions(*self.split(x, p)).mass, np.zeros_like(p)
+        inner, still = self.inner.actions(*self.split(x, p)), np.zeros_like(p)
         return Actions(
             lambda dx: self.derivative(x, p, dx, still),
-            lambda dx: np.append(mass(dx[:-1]), 0.0),
+            lambda dx: np.append(inner.mass(dx[:-1]), 0.0),
             lambda s: self.linearise(x, p, Rate.of_growth(self.stored(x, p), s))[1],
+            np.append(inner.moving, False),
         )
 
     def stored(self, x: Array, p: Array) -> Array:

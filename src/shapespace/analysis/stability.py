@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapespace.base.arrays import Array
+from shapespace.base.arrays import Array, Flags
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractLinearisation, AbstractSmoothProblem
-from shapespace.numerics.spectrum import CONVERGED, ComplexArray, Flags, Krylov, Pencil, Ritz
+from shapespace.numerics.spectrum import CONVERGED, SETTLED, ComplexArray, Krylov, Pencil, Ritz
 
 ALIGNED = 1e-3
 """A mode counts as even or odd, or as a known direction, where it is so up to this relative difference."""
@@ -25,11 +25,13 @@ VERIFIED = 1e-6
 PROBE = 16
 """Dimension of the space that only looks for the largest rates, from far to their right."""
 DIMENSION_STEP = 4
-"""The space grows by this between looks at its Ritz values."""
+"""The space grows by this where its residuals do not tell by how much. They fall from about three steps per wanted rate on."""
 FAR = 1e3
 """Where the search starts without a known shift; problems are dimensionless and of order one."""
 FARTHEST = 1e9
 """Rates beyond this are not looked for."""
+SPARE = 1.5
+"""Of the lowest shift that will do, the one to start from at a neighbour, whose rates may be larger."""
 ROUGH = 0.1
 """Ritz values with an estimated relative residual below this tell the scale of the rates."""
 
@@ -196,14 +198,14 @@ class _Search:
             krylov.extend(dimension)
             ritz = krylov.ritz()
             settled = ritz.settled
-            inside, exact = ritz.rates[:settled], ritz.residuals[:settled] <= CONVERGED
+            inside, residuals = ritz.rates[:settled], ritz.residuals[:settled]
             radius = np.inf if krylov.is_invariant else float(abs(shift - inside[-1])) if len(inside) else 0.0
             leading, disc = _leading(inside, count), Disc(shift, radius)
-            is_exact = bool(exact[leading].all() and exact[inside.real > 0.0].all())
-            is_enough = is_exact and _is_covered(inside[leading], disc, count)
+            worst = max(residuals[leading].max(initial=0.0), residuals[inside.real > 0.0].max(initial=0.0))
+            is_enough = worst <= CONVERGED and _is_covered(inside[leading], disc, count)
             if is_enough or krylov.is_invariant or krylov.dimension == most:
                 break
-            dimension += DIMENSION_STEP
+            dimension += _steps_left(worst, dimension - 3 * count)
         self.applications += krylov.applications
         if not is_enough:
             new = _shift_by(ritz)
@@ -230,7 +232,10 @@ class _Search:
                 modes[i] -= defect
                 if defects[i] <= self.options.accuracy:
                     break
-            modes[i] *= _phase(modes[i]) / np.sqrt(self.weights @ np.abs(modes[i]) ** 2)
+            squares = modes[i].real ** 2 + modes[i].imag ** 2
+            largest = modes[i][squares.argmax()]
+            # Of unit size, its largest entry positive.
+            modes[i] *= largest.conjugate() / abs(largest) / np.sqrt(self.weights @ squares)
         accuracy = np.maximum(ritz.residuals[:settled], max(self.options.accuracy, self.options.state_error))
         accuracy[leading] = np.maximum(accuracy[leading], defects)
         errors = np.abs(pencil.shift - rates) * krylov.conditions(ritz)[:settled] * accuracy
@@ -270,10 +275,18 @@ class _Search:
             neutral=names,
             n_unstable=unstable,
             disc=pairs.disc,
-            next_shift=1.2 * _lowest_shift(rates),
+            next_shift=SPARE * _lowest_shift(rates),
             applications=self.applications,
             factorisations=self.factorisations,
         )
+
+
+def _steps_left(residual: float, steps: int) -> int:
+    """After how many steps a residual, which has fallen from one in so many, is expected to be that of a converged pair."""
+    if residual <= CONVERGED:
+        return DIMENSION_STEP
+    share = np.log(residual / CONVERGED) / -np.log(min(residual, SETTLED))
+    return int(np.clip(np.ceil(share * steps), 1, 2 * DIMENSION_STEP))
 
 
 def _is_rateless(krylov: Krylov) -> bool:
@@ -310,12 +323,6 @@ def _shift_by(ritz: Ritz) -> float:
     rough = ritz.rates[is_rough] if is_rough.any() else ritz.rates
     first = rough[_leading(rough, 3)]
     return max(1.2 * _lowest_shift(first), 0.5 * float(np.abs(first).max(initial=0.0)))
-
-
-def _phase(mode: ComplexArray) -> complex:
-    """The factor of modulus one that makes the largest entry positive."""
-    largest = mode[np.argmax(np.abs(mode))]
-    return complex(largest.conjugate() / abs(largest))
 
 
 def _parities(

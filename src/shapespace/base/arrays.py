@@ -32,5 +32,8 @@ _keep_compiled_functions()
 Array = NDArray[np.float64]
 """A host array of doubles; shapes are stated in docstrings as (e elements, k stages, n fields, ...)."""
 
+Flags = NDArray[np.bool_]
+"""A host array of truth values."""
+
 Traced = jax.Array
 """An array or scalar inside a differentiated or compiled function."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from shapespace.base.arrays import Array
+from shapespace.base.arrays import Array, Flags
 
 
 @dataclass(frozen=True)
@@ -114,11 +114,15 @@ class AbstractContinuableProblem(AbstractProblem):
 
 
 class Actions(NamedTuple):
-    """The pencil J + s B at one state: products dx (n,) -> (n,) with the Jacobian J and the mass B, and factors at a real s."""
+    """The pencil J + s B at one state: products dx (n,) -> (n,) with the Jacobian J and the mass B, and factors at a real s.
+
+    moving (n,): unknowns that B acts on; its other columns are zero.
+    """
 
     jacobian: Callable[[Array], Array]
     mass: Callable[[Array], Array]
     factors: Callable[[float], AbstractLinearisation]
+    moving: Flags
 
 
 class AbstractSmoothProblem(AbstractContinuableProblem):

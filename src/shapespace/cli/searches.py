@@ -28,9 +28,6 @@ from shapespace.cli.shared import (
 if TYPE_CHECKING:
     from shapespace.study.search_store import Search, Tried
 
-SHOWN = ("height", "neck_radius", "velocity")
-"""Observables by which states are told apart at a glance; all are in the store."""
-
 
 @app.command(
     name="search",
@@ -138,24 +135,11 @@ def _record(found: "Search") -> dict[str, Any]:
 
 
 def _summarise(found: "Search") -> None:
-    from collections import Counter
-
     from rich.table import Table
 
-    shown = [name for name in SHOWN if any(name in one.observables for one in found.states)]
-    table = Table("state", *shown, "growing", "leading rate", "mirror", box=None, header_style="bold")
-    for one in found.states:
-        values = [_rounded(one.observables[name]) if name in one.observables else "" for name in shown]
-        rate = f"{one.growth_rates[0][0]:.6g}" if len(one.growth_rates) else ""
-        growing = "?" if one.n_unstable is None else str(one.n_unstable)
-        table.add_row(one.label, *values, growing, rate, "other" if one.is_mirrored else "same")
+    headings, *rows = found.table
+    table = Table(*headings, box=None, header_style="bold")
+    for row in rows:
+        table.add_row(*row)
     assert found.outcome is not None
-    counts = Counter("new state" if one.label else one.outcome for one in found.tried)
-    ends = ", ".join(f"{count} {name}" for name, count in counts.most_common())
-    print_lines(table, "", f"{len(found.tried)} starts: {ends}", f"{found.outcome}: {found.outcome.advice}")
-    print_lines(f"stored in {found.store}")
-
-
-def _rounded(value: float) -> str:
-    """Five decimals, and no minus before a zero."""
-    return f"{round(value, 5) + 0.0:.5f}"
+    print_lines(table, "", found.counts, f"{found.outcome}: {found.outcome.advice}", f"stored in {found.store}")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from shapespace.base.arrays import Array
+from shapespace.base.arrays import Array, Flags
 from shapespace.base.problem import (
     REST,
     AbstractLinearisation,
@@ -22,7 +22,7 @@ from shapespace.numerics.adaptation import adapted_mesh
 from shapespace.numerics.border import with_border
 from shapespace.numerics.gauss import gauss_rule
 from shapespace.numerics.layout import assembled, by_element, joined, lay_out, product
-from shapespace.numerics.pointwise import Density, Functions, compiled_functions, numbers, points_per_tile
+from shapespace.numerics.pointwise import Density, Functions, Values, compiled_functions, numbers, points_per_tile
 from shapespace.numerics.small_lu import compiled, read_only
 from shapespace.numerics.state import State
 from shapespace.numerics.system import AbstractSystem, Symmetry
@@ -33,9 +33,6 @@ RELATIVE_FLOOR = 1.0
 
 Slopes = tuple[Array, Array]
 """Derivatives by x (size,) and by p (n_p,)."""
-
-FAST = 2.0**20
-"""A rate of growth at which the mass stands out of the Jacobian's round-off."""
 
 
 @compiled
@@ -195,11 +192,13 @@ class CollocationProblem(AbstractSmoothProblem):
     def blocks(self, x: Array, p: Array, rate: Rate) -> tuple[Array, Array, Array, Array]:
         """Residual, and the Jacobian's blocks: points (m + n_i, m + n + n_s, k, N), ends, targets."""
         out = [self.functions.linearised(tile) for tile in self._tiles(x, p, rate)]
-        slopes = out[0][1]
-        points = np.ascontiguousarray(joined([part.rows for _, part in out], self._points))
+        return self._assembled([values for values, _ in out], x), *self._blocks_of([slopes for _, slopes in out])
+
+    def _blocks_of(self, tiles: Sequence[Values]) -> tuple[Array, Array, Array]:
+        """Of all tiles."""
+        points = np.ascontiguousarray(joined([tile.rows for tile in tiles], self._points))
         points = points.reshape(*points.shape[:2], self.degree, self.elements)
-        residual = self._assembled([values for values, _ in out], x)
-        return residual, points, np.asarray(slopes.ends), np.asarray(slopes.targets)
+        return points, np.asarray(tiles[0].ends), np.asarray(tiles[0].targets)
 
     def linearise(
         self, x: Array, p: Array, rate: Rate, border: Border | None = None
@@ -229,15 +228,28 @@ class CollocationProblem(AbstractSmoothProblem):
         return self._assembled([self.functions.second_derivative(*tile) for tile in tiles], np.zeros_like(x))
 
     def actions(self, x: Array, p: Array) -> Actions:
-        """By the blocks of the Jacobian at rest, and by their change as all grows at some rate, in which they are linear."""
+        """By the blocks of the Jacobian at rest, and by what a growth rate adds to them, in which they are linear."""
         rest = self.blocks(x, p, REST)[1:]
-        growing = self.blocks(x, p, Rate.of_growth(self.stored(x, p), FAST))[1:]
-        mass = [(after - before) / FAST for after, before in zip(growing, rest, strict=True)]
+        mass = self._blocks_of([self.functions.mass(tile) for tile in self._tiles(x, p)])
 
         def factors(s: float) -> CollocationLinearisation:
             return self._factorised(*(j + s * b for j, b in zip(rest, mass, strict=True)))
 
-        return Actions(self._product(rest, 1.0), self._product(mass, 0.0), factors)
+        return Actions(self._product(rest, 1.0), self._product(mass, 0.0), factors, self._moving(*mass))
+
+    def _moving(self, points: Array, ends: Array, targets: Array) -> Flags:
+        """Unknowns that a matrix without continuity rows acts on, of all points alike."""
+        n = self.n
+        at_points, at_ends, shape = (
+            np.any(points, axis=(0, 2, 3)),
+            np.any(ends, axis=0),
+            (self.elements, self.degree, 1),
+        )
+        slope, algebraic, field, scalar = np.split(at_points, np.cumsum([n, self.n_rows - n, n]))
+        field |= at_ends[:n] | at_ends[n : 2 * n]
+        scalar |= at_ends[2 * n :] | np.any(targets, axis=0)
+        parts = (field, (self.elements + 1, 1)), (slope | field, shape), (algebraic, shape), (scalar, 1)
+        return np.concatenate([np.tile(flags, times).ravel() for flags, times in parts])
 
     def _product(self, blocks: Sequence[Array], jumps: float) -> Callable[[Array], Array]:
         """Multiplication by a matrix of these blocks (points, ends, targets), with `jumps` times the continuity rows."""

@@ -164,6 +164,37 @@ def _linearised(system: AbstractSystem, packed: Traced) -> tuple[Traced, Values]
     return values.flat(), Values(slopes, end_slopes, target_slopes)
 
 
+def _mass(system: AbstractSystem, packed: Traced) -> Values:
+    """At rest, what a growth rate of one adds to the Jacobians of `_linearised`: dF/d(dq/dt) dq/dx, as few q are stored."""
+    tile = _opened(system, packed)
+    columns, n, (n_q, n_i) = len(tile.rows), len(system.fields), numbers(system)
+    s, none = tile.scalars, jnp.zeros(len(system.algebraic))
+
+    def stored(v: Traced) -> Traced:
+        _, a, y = _split_row(system, v[:columns])
+        return system.stored(y, a, v[columns:])
+
+    def at(v: Traced, u: Traced) -> Traced:
+        dy, a, y = _split_row(system, v[:columns])
+        by_rate = jax.jacfwd(lambda dq: system.equations(dy, y, a, s, dq, u, tile.p))(jnp.zeros(n_q))
+        by_state, rows = jax.jacfwd(stored)(v), jnp.zeros((len(by_rate), len(v)))
+        for i in range(n_q):  # not as a product of matrices, which XLA would hand to a routine for each point
+            rows += by_rate[:, i, None] * by_state[i]
+        return jnp.concatenate([rows, jnp.zeros((n_i, len(v)))])
+
+    def stored_at_ends(v: Traced) -> Traced:
+        ends = v[: 2 * n].reshape(2, n)
+        return jnp.stack([system.stored(ends[i], none, v[2 * n :]) for i in (0, 1)])
+
+    def at_ends(dq: Traced) -> Traced:
+        return system.end_conditions(tile.ends[0], tile.ends[1], s, dq[0], dq[1], tile.p)
+
+    wide = jnp.concatenate([tile.rows, jnp.broadcast_to(s[:, None], (len(s), tile.u.shape[0]))])
+    rows = jax.vmap(at, in_axes=-1, out_axes=-1)(wide, tile.u)
+    by_ends = jax.jacfwd(stored_at_ends)(jnp.concatenate([tile.ends.ravel(), s]))
+    return Values(rows, jnp.tensordot(jax.jacfwd(at_ends)(jnp.zeros((2, n_q))), by_ends, 2), jnp.zeros((n_i, len(s))))
+
+
 def _change(system: AbstractSystem, packed: Traced) -> Tile:
     """The tile of a change of the state and the parameters, where points stay."""
     tile = _opened(system, packed)
@@ -220,6 +251,7 @@ class Functions(NamedTuple):
 
     values: Callable[..., Traced]
     linearised: Callable[..., tuple[Traced, Values]]
+    mass: Callable[..., Values]
     stored: Callable[..., tuple[Traced, Traced]]
     derivative: Callable[..., Traced]
     second_derivative: Callable[..., Traced]
@@ -257,6 +289,7 @@ def compiled_functions(system: AbstractSystem) -> Functions:
     return Functions(
         values=compiled(_values),
         linearised=compiled(_linearised),
+        mass=compiled(_mass),
         stored=compiled(_stored),
         derivative=compiled(_first_derivative),
         second_derivative=compiled(_second_derivative),

@@ -24,7 +24,6 @@ from shapespace.base.arrays import Array
 from shapespace.base.problem import AbstractLinearisation, Actions
 
 ComplexArray = NDArray[np.complex128]
-Flags = NDArray[np.bool_]
 CONVERGED = 1e-11
 """Ritz pairs with an estimated relative residual below this are eigenpairs to working accuracy."""
 SETTLED = 1e-4
@@ -97,44 +96,54 @@ class Pencil:
 
 
 class Krylov:
-    """The space spanned by powers of S on a random start: an orthonormal basis (j, n), and S in it (j + 1, j)."""
+    """The space spanned by powers of S on a random start, reduced to the unknowns that B acts on: the others follow from them.
+
+    An orthonormal basis (j, r) of vectors scaled to the Euclidean norm, S in it (j + 1, j), and the images (j, n) of S.
+    """
 
     def __init__(self, pencil: Pencil, capacity: int, seed: int) -> None:
         n = len(pencil.seen)
         self.pencil = pencil
         self.dimension = 0
         self.applications = 2
-        self._basis = np.empty((capacity + 1, n))
+        self._moving = np.flatnonzero(pencil.actions.moving)
+        self._roots = np.sqrt(pencil.weights[self._moving])
+        self._basis = np.empty((capacity + 1, len(self._moving)))
+        self._images = np.empty((capacity, n))
         self._matrix = np.zeros((capacity + 1, capacity))
         # Random, so that no mode is left out: from a start of one parity the others would never appear.
         start = pencil.apply(pencil.apply(np.random.default_rng(seed).standard_normal(n)))
-        size = pencil.size(start)
+        reduced = self._roots * start[self._moving]
+        size = np.linalg.norm(reduced)
         if size > 0.0:
-            self._basis[0] = start / size
+            self._basis[0] = reduced / size
         self.is_invariant = not size > 0.0
 
     def extend(self, dimension: int) -> None:
         """Apply S until the space has this dimension, or is invariant."""
+        whole = np.zeros(self._images.shape[1])
         while self.dimension < min(dimension, self._matrix.shape[1]) and not self.is_invariant:
             j = self.dimension
-            image = self.pencil.apply(self._basis[j])
+            whole[self._moving] = self._basis[j] / self._roots
+            self._images[j] = image = self.pencil.apply(whole)
             self.applications += 1
-            size, parts = self.pencil.size(image), np.zeros(j + 1)
-            rest = size
-            for _ in range(2):
-                more = self._basis[: j + 1] @ (self.pencil.weights * image)
-                image -= more @ self._basis[: j + 1]
+            new, basis = self._roots * image[self._moving], self._basis[: j + 1]
+            parts = basis @ new
+            new -= parts @ basis
+            rest = np.sqrt(new @ new)
+            size = np.hypot(np.linalg.norm(parts), rest)
+            if rest <= NOTABLE * size:
+                more = basis @ new
+                new -= more @ basis
                 parts += more
-                before, rest = rest, self.pencil.size(image)
-                if rest > NOTABLE * before:
-                    break
+                rest = np.sqrt(new @ new)
             self._matrix[: j + 1, j] = parts
             self.dimension = j + 1
             if not rest > BREAKDOWN * size:
                 self.is_invariant = True
             else:
                 self._matrix[j + 1, j] = rest
-                self._basis[j + 1] = image / rest
+                np.divide(new, rest, out=self._basis[j + 1])
 
     def ritz(self) -> Ritz:
         """The approximate eigenpairs that the space holds."""
@@ -148,10 +157,14 @@ class Krylov:
 
     def conditions(self, ritz: Ritz) -> Array:
         """Condition numbers (j,) of the eigenvalues of S in the space: 1 for orthogonal modes, large near a double rate."""
-        left = np.linalg.pinv(ritz.coefficients, rcond=1e-15)
-        return np.linalg.norm(left, axis=1) * np.linalg.norm(ritz.coefficients, axis=0)
+        right = ritz.coefficients if ritz.coefficients.imag.any() else ritz.coefficients.real
+        left = np.linalg.pinv(right, rcond=1e-15)
+        return np.linalg.norm(left, axis=1) * np.linalg.norm(right, axis=0)
 
     def modes(self, coefficients: ComplexArray) -> ComplexArray:
-        """Increments (m, n) of coefficients (j, m) in the basis."""
-        basis = self._basis[: self.dimension]
-        return np.asarray(coefficients.real.T @ basis + 1j * (coefficients.imag.T @ basis))
+        """Increments (m, n) of coefficients (j, m) in the basis, after one more application of S."""
+        images = self._images[: self.dimension]
+        modes = (coefficients.real.T @ images).astype(np.complex128)
+        if coefficients.imag.any():
+            modes.imag = coefficients.imag.T @ images
+        return modes

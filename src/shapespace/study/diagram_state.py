@@ -53,17 +53,17 @@ class DiagramStates:
 
     def state(self, place: Place) -> Steady:
         """The state at a point. InputError where the diagram has none, StoreError where it is not found again."""
-        if not self._has(place):
-            raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
         found = self.find(place)
-        if found is None:
-            raise StoreError(f"{self._store.path}: the state at this point was not found again; resume the diagram.")
-        return found
+        if found is not None:
+            return found
+        if self._numbers.at(*place, [OUTCOME])[OUTCOME] != CODES[Outcome.CONVERGED]:
+            raise InputError(f"{self._store.path}: has no state at this point; choose another one.")
+        raise StoreError(f"{self._store.path}: the state at this point was not found again; resume the diagram.")
 
     def find(self, place: Place) -> Steady | None:
         """The state at a point, None where the diagram has none or it is not found again."""
         if place not in self._known:
-            again = self._again(place) if self._has(place) else None
+            again = self._again(place)
             if again is None:
                 return None
             self._known[place] = again
@@ -72,12 +72,14 @@ class DiagramStates:
             self._known.popitem(last=False)
         return self._known[place]
 
-    def _has(self, place: Place) -> bool:
-        return place in self._known or self._numbers.at(*place, [OUTCOME])[OUTCOME] == CODES[Outcome.CONVERGED]
-
     def _again(self, place: Place) -> Steady | None:
-        """The state at a point, computed again and recognised by what is stored of it; None where it is not found."""
-        scenario, stored = self.scenario_at(place), self._numbers.at(*place, _CHECKED)
+        """The state at a point, computed again and recognised by what is stored of it; None where there is none or it is not
+        found.
+        """
+        stored = self._numbers.at(*place, (OUTCOME, *_CHECKED))
+        if stored[OUTCOME] != CODES[Outcome.CONVERGED]:
+            return None
+        scenario = self.scenario_at(place)
         for found in self._tried(place):
             if found is not None and found.outcome.is_success:
                 assert isinstance(found.problem, KeyedProblem)

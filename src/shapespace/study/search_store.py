@@ -3,6 +3,7 @@
 """
 
 import json
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,8 +14,12 @@ import numpy as np
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.frame import Array, Frame, arrays_of, frame_of_arrays, read_arrays, write_arrays
+from shapespace.study.presenting import Presented, Summary, Table
 from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import Scenario
+
+SHOWN = ("height", "neck_radius", "velocity")
+"""Observables by which states are told apart at a glance; all are in the store."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +126,7 @@ class SearchStore(AbstractRecordStore[Tried]):
 
 
 @dataclass(frozen=True)
-class Search:
+class Search(Presented):
     """Stationary states of a scenario that a search found. tried: every start, in order, with what it led to."""
 
     outcome: Outcome | None
@@ -134,6 +139,33 @@ class Search:
         """The tries that found new states."""
         return tuple(one for one in self.tried if one.label)
 
+    @property
+    def table(self) -> Table:
+        """The states with what tells them apart."""
+        shown = [name for name in SHOWN if any(name in one.observables for one in self.states)]
+        rows = [("state", *shown, "growing", "leading rate", "mirror")]
+        for one in self.states:
+            values = [_rounded(one.observables[name]) if name in one.observables else "" for name in shown]
+            rate = f"{one.growth_rates[0][0]:.6g}" if len(one.growth_rates) else ""
+            growing = "?" if one.n_unstable is None else str(one.n_unstable)
+            rows.append((one.label, *values, growing, rate, "other" if one.is_mirrored else "same"))
+        return rows
+
+    @property
+    def counts(self) -> str:
+        """How many starts led to what, in words."""
+        counts = Counter("new state" if one.label else one.outcome for one in self.tried)
+        return f"{len(self.tried)} starts: {', '.join(f'{count} {name}' for name, count in counts.most_common())}"
+
+    def summary(self) -> Summary:
+        """The states found, and what the starts led to."""
+        facts = {
+            "outcome": f"{self.outcome}: {self.outcome.advice}" if self.outcome else "unfinished",
+            "tried": self.counts,
+            "store": str(self.store or "in memory"),
+        }
+        return Summary(f"Stationary states of {self.scenario.name}", facts, {"states": self.table})
+
     def label_of(self, one: Tried) -> str | None:
         """The label of the state that a try led to, if any."""
         return next((state.label for state in self.states if state.number == one.number), None)
@@ -145,6 +177,11 @@ class Search:
                 return state
         labels = ", ".join(state.label for state in self.states) or "another store, as it found no state"
         raise InputError(f"{label or 'no label'}: is no state of this search; choose one of {labels}.")
+
+
+def _rounded(value: float) -> str:
+    """Five decimals, and no minus before a zero."""
+    return f"{round(value, 5) + 0.0:.5f}"
 
 
 def open_search(path: str | Path) -> Search:
