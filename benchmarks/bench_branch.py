@@ -2,7 +2,7 @@
 
 Both start from the sphere on 60 elements of 4 Gauss points with the mesh moved along, and locate the folds. Ours locates
 the branch points too; AUTO looks for none (peer_auto.py says why) and is compared with ours locating folds alone, each with
-its longest steps and with steps that make some 140 points. Then ours with the leading growth rates at every point, which
+its longest steps and with steps that make as many points as its. Then ours with the leading growth rates at every point, which
 AUTO does not offer for boundary value problems, 100 points of Bratu's problem beside PyCont-Lite, and 40 points of the fold
 curve of Chan's problem with its cusp.
 
@@ -42,7 +42,7 @@ from shapespace.study.verification.classic import at_rest, bratu, chan
 KEY, END = "ring_amplitude", 4.2
 MESH_TOLERANCE = 1e-4
 """Met by 60 elements all along the branch, so that ours has as many as AUTO."""
-DENSE = 0.07
+DENSE = 0.069
 """Largest step that makes as many points as AUTO has with its shorter steps."""
 CHAN_CUSP = (4.1909181064, 0.0282060679)
 """(a, b); references/continuation.md, row 5."""

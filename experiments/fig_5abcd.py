@@ -104,6 +104,8 @@ def draw(found: ss.Diagram, out: Path) -> None:
         for place, shown, number, title in zip(axes[1], SHOWN, (0, 1), ("$R_0/L_h$ = 5", "Pe = 300"), strict=True):
             draw_shapes(place, found.scenario, shown, number)
             place.set_title(title)
+        for place, letter in zip(axes.flat, "abcd", strict=True):
+            place.set_title(f"({letter})", loc="left", fontweight="bold")
         save(figure, out, "fig_5abcd")
 
 

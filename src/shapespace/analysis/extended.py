@@ -142,8 +142,8 @@ class ExtendedProblem(AbstractProblem):
     def norm(self, dX: Array, X: Array) -> float:
         """The problem's, or the largest change of a free parameter relative to it (or one)."""
         m = len(self.free)
-        parameters = np.abs(dX[-m:]) / np.maximum(np.abs(X[-m:]), 1.0)
-        return max(self.problem.norm(dX[:-m], X[:-m]), float(parameters.max()))
+        parameters = [abs(dp) / max(abs(p), 1.0) for dp, p in zip(dX[-m:].tolist(), X[-m:].tolist(), strict=True)]
+        return max(self.problem.norm(dX[:-m], X[:-m]), *parameters)
 
     def stored_norm(self, dq: Array, q: Array) -> float:
         return self.problem.stored_norm(dq, q)

@@ -95,6 +95,16 @@ class SingularProblem(AbstractContinuableProblem):
         return out
 
     def _kernel(self, big_x: Array, p: Array, rate: Rate = REST) -> Kernel:
+        """M factorised at X. At rest the last one is kept: Newton asks for residual, Jacobian and derivatives at one place."""
+        if rate is not REST:
+            return self._factorised(big_x, p, rate)
+        place = big_x.tobytes() + p.tobytes()
+        if place not in self._last:
+            self._last.clear()
+            self._last[place] = self._factorised(big_x, p, REST)
+        return self._last[place]
+
+    def _factorised(self, big_x: Array, p: Array, rate: Rate) -> Kernel:
         x, d = self.state(big_x), len(self.kernel)
         p = self.parameters(big_x, p)
         still = np.zeros_like(x)

@@ -204,8 +204,7 @@ def determinant_sign(factors: Factors) -> float:
     f, plan, local = factors, factors.plan, factors.local
     if f.singular:
         return 0.0
-    matching = sum(np.count_nonzero(plan.partner[:i] > plan.partner[i]) for i in range(len(plan.partner)))
-    sign = (-1.0) ** (matching * (len(plan.position) // len(plan.partner) * len(f.widths)) % 2)
+    sign = (-1.0) ** (plan.inversions * (len(plan.position) // len(plan.partner) * len(f.widths)) % 2)
     sign *= _signs_of_stages(local.work[: len(plan.position)], local.pivoted)
     for lu, exchanges in (
         (local.dense, local.exchanges),

@@ -21,7 +21,8 @@ class Plan(NamedTuple):
     """How stages of one pattern are eliminated: every operation, written down once.
 
     position (k m,): place of each unknown (stage m + column) in the order of pivots, which rows and columns below follow;
-    partner (m,): equation -> column within a stage; structure (m, columns): non-zeros of a point's equations.
+    partner (m,): equation -> column within a stage, a permutation with so many inversions; structure (m, columns): non-zeros
+    of a point's equations.
     slot (k m, k m + n + n_s): row of the work array that holds an entry, -1 where there is none: first the pivots, then the
     other factors, last the columns of (Y_e, s). lower, upper (., 3): row, column and slot of the factors, lower by columns
     from the pivots down, upper by rows from the last up. scaled (.,), operations (., 3): slots of a pivot's row, and of
@@ -31,6 +32,7 @@ class Plan(NamedTuple):
 
     position: IntArray
     partner: IntArray
+    inversions: int
     structure: BoolArray
     slot: IntArray
     lower: IntArray
@@ -92,7 +94,8 @@ def _plan(non_zeros: bytes, partners: tuple[int, ...], n: int, k: int) -> Plan:
     pattern = stages.reshape(size, -1)
     order = _pivot_order(pattern.copy())
     pattern = pattern[order][:, np.concatenate([order, np.arange(size, pattern.shape[1])])]
-    return Plan(np.argsort(order), partner, structure, *_operations(pattern))
+    inversions = sum(np.count_nonzero(partner[:i] > partner[i]) for i in range(m))
+    return Plan(np.argsort(order), partner, int(inversions), structure, *_operations(pattern))
 
 
 def _pivot_order(pattern: BoolArray) -> IntArray:
