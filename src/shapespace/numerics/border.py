@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from shapespace.base.arrays import Array
 from shapespace.base.problem import Border
-from shapespace.numerics.small_lu import Array, compiled, copy, put, read_only
 
 
 def with_border(
@@ -14,51 +14,32 @@ def with_border(
     border.columns (m_b, size): flat as residuals (equations (N, k, m), continuity (N, n), ends, integrals); border.rows
     (m_b, size): flat as states (nodes (N + 1, n), slopes (N, k, n), algebraic (N, k, n_a), scalars).
     """
-    columns, rows, corner = (
-        read_only(np.ascontiguousarray(part)) for part in (border.columns, border.rows, border.corner)
-    )
-    blocks = (read_only(part) for part in (points, ends, targets))
-    return _bordered(columns, rows, corner, widths, weights, n, *blocks)
-
-
-@compiled
-def _bordered(
-    columns: Array, rows: Array, corner: Array, widths: Array, weights: Array, n: int, points: Array, ends: Array,
-    targets: Array,
-) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
     n_rows, n_columns, k, elements = points.shape
-    (n_i, n_s), (n_b, end_columns), extra = targets.shape, ends.shape, corner.shape[0]
-    m = n_rows - n_i
-    slopes, algebraic, scalars = (elements + 1) * n, (elements + 1 + elements * k) * n, elements * (k * m + n) + n
-    continuity, at_ends, integrals = elements * k * m, elements * (k * m + n), elements * (k * m + n) + n_b
-    wide = np.zeros((n_rows + extra, n_columns + extra, k, elements))
-    for c in range(n_rows):
-        for d in range(n_columns):
-            copy(wide[c, d], points[c, d])
+    (n_i, n_s), extra = targets.shape, len(border.corner)
+    m, stages = n_rows - n_i, k * elements
+
+    def by_stage(part: Array, fields: int) -> Array:
+        return part.reshape(extra, elements, k, fields).transpose(0, 3, 2, 1)
+
+    columns, rows = border.columns, border.rows
+    continuity, at_ends = stages * m, stages * m + elements * n
+    integrals = at_ends + len(ends)
+    slopes, algebraic = (elements + 1) * n, (elements + 1 + stages) * n
+    scalars = algebraic + stages * (m - n)
+    # Integral rows are sums over points with these weights.
+    shares = weights[:, None] * widths
+    wide = np.empty((n_rows + extra, n_columns + extra, k, elements))
+    wide[:n_rows, :n_columns] = points
+    wide[:m, n_columns:] = by_stage(columns[:, :continuity], m).swapaxes(0, 1)
+    wide[m:n_rows, n_columns:] = 0.0
+    wide[n_rows:, :n] = by_stage(rows[:, slopes:algebraic], n) / shares
+    wide[n_rows:, n:m] = by_stage(rows[:, algebraic:scalars], m - n) / shares
+    wide[n_rows:, m:] = 0.0
     jumps, nodes = np.zeros((elements, n, n_s + extra)), np.zeros((elements + 1, n_i + extra, n))
-    wide_ends, wide_targets = np.empty((n_b, end_columns + extra)), np.empty((n_i + extra, n_s + extra))
-    copy(wide_ends[:, :end_columns], ends)
-    copy(wide_targets[:n_i, :n_s], targets)
-    for b in range(extra):
-        column, row = columns[b], rows[b]
-        for j in range(k):
-            for e in range(elements):
-                # Integral rows are sums over points with these weights.
-                point, share = e * k + j, widths[e] * weights[j]
-                for c in range(m):
-                    wide[c, n_columns + b, j, e] = column[point * m + c]
-                for c in range(n):
-                    wide[n_rows + b, c, j, e] = row[slopes + point * n + c] / share
-                for c in range(m - n):
-                    wide[n_rows + b, n + c, j, e] = row[algebraic + point * (m - n) + c] / share
-        for e in range(elements):
-            for c in range(n):
-                jumps[e, c, n_s + b] = column[continuity + e * n + c]
-        for e in range(elements + 1):
-            for c in range(n):
-                nodes[e, n_i + b, c] = row[e * n + c]
-        put(wide_ends[:, end_columns + b], column[at_ends:integrals])
-        put(wide_targets[:n_i, n_s + b], -column[integrals:])
-        put(wide_targets[n_i + b], -row[scalars:])
-        put(wide_targets[n_i + b, n_s:], -corner[b])
+    jumps[..., n_s:] = columns[:, continuity:at_ends].reshape(extra, elements, n).transpose(1, 2, 0)
+    nodes[:, n_i:] = rows[:, :slopes].reshape(extra, elements + 1, n).swapaxes(0, 1)
+    wide_ends = np.concatenate([ends, columns[:, at_ends:integrals].T], axis=1)
+    wide_targets = np.empty((n_i + extra, n_s + extra))
+    wide_targets[:n_i, :n_s], wide_targets[:n_i, n_s:] = targets, -columns[:, integrals:].T
+    wide_targets[n_i:, :n_s], wide_targets[n_i:, n_s:] = -rows[:, scalars:], -border.corner
     return wide, wide_ends, wide_targets, jumps, nodes

@@ -51,7 +51,8 @@ def lay_out(
                     own[e] = x[algebraic + (e * k + j) * n_a + c - n]
             elif c < 2 * n + n_a:
                 field = c - n - n_a
-                own[:] = 0.0
+                for e in range(elements):
+                    own[e] = 0.0
                 for l in range(k):
                     share, first = matrix[j, l], slopes + l * n + field
                     for e in range(elements):
@@ -64,7 +65,8 @@ def lay_out(
             else:
                 for e in range(elements):
                     own[e] = mesh[e] + (mesh[e + 1] - mesh[e]) * stages[j]
-        column[n_points:] = column[n_points - 1]
+        for point in range(n_points, n_tiles * size):
+            column[point] = column[n_points - 1]
         for index in range(n_tiles):
             put(out[index, c * size :], column[index * size : (index + 1) * size])
     for index in range(n_tiles):
@@ -125,52 +127,53 @@ def product(
     n, n_a = (end_columns - n_s) // 2, m - (end_columns - n_s) // 2
     slopes, continuity = (elements + 1) * n, elements * k * m
     algebraic = slopes + elements * k * n
-    scalars = x[algebraic + elements * k * n_a :]
-    widths = mesh[1:] - mesh[:-1]
+    scalars = algebraic + elements * k * n_a
     out = np.zeros(continuity + elements * n + n_b + n_i)
-    integrals = out[continuity + elements * n + n_b :]
-    nodes, inside = x[:slopes].reshape(-1, n), x[slopes:algebraic].reshape(elements, k, n)
-    values, total = np.empty(elements), np.empty((n_rows, elements))
-    for j in range(k):
-        total[:] = 0.0
-        for c in range(columns):
-            if not structure[:, c].any():
-                continue
-            if c < n:
-                values[:] = inside[:, j, c]
-            elif c < m:
-                values[:] = x[algebraic + j * n_a + c - n : algebraic + elements * k * n_a : k * n_a][:elements]
-            elif c < m + n:
-                values[:] = 0.0
-                for l in range(k):
-                    values += matrix[j, l] * inside[:, l, c - m]
-                values = nodes[:elements, c - m] + widths * values
-            else:
-                values[:] = scalars[c - m - n]
+    integrals = continuity + elements * n + n_b
+    values = np.empty(elements)
+    for c in range(columns):
+        for j in range(k):
+            is_known = False
             for row in range(n_rows):
-                if structure[row, c]:
-                    block, target = points[row, c, j], total[row]
+                if not structure[row, c]:
+                    continue
+                if not is_known:
+                    is_known = True
                     for e in range(elements):
-                        target[e] += block[e] * values[e]
-        for row in range(m):
-            for e in range(elements):
-                out[(e * k + j) * m + row] = total[row, e]
-        for q in range(n_i):
-            integrals[q] += weights[j] * (widths * total[m + q]).sum()
+                        if c < n:
+                            values[e] = x[slopes + (e * k + j) * n + c]
+                        elif c < m:
+                            values[e] = x[algebraic + (e * k + j) * n_a + c - n]
+                        elif c < m + n:
+                            rise = 0.0
+                            for l in range(k):
+                                rise += matrix[j, l] * x[slopes + (e * k + l) * n + c - m]
+                            values[e] = x[e * n + c - m] + (mesh[e + 1] - mesh[e]) * rise
+                        else:
+                            values[e] = x[scalars + c - m - n]
+                block = points[row, c, j]
+                if row < m:
+                    for e in range(elements):
+                        out[(e * k + j) * m + row] += block[e] * values[e]
+                else:
+                    for e in range(elements):
+                        out[integrals + row - m] += weights[j] * (mesh[e + 1] - mesh[e]) * block[e] * values[e]
     if jumps != 0.0:
         for e in range(elements):
             for c in range(n):
                 rise = 0.0
                 for l in range(k):
-                    rise += weights[l] * inside[e, l, c]
-                out[continuity + e * n + c] = jumps * (nodes[e + 1, c] - nodes[e, c] - widths[e] * rise)
-    at_ends = np.concatenate((nodes[0], nodes[elements], scalars))
+                    rise += weights[l] * x[slopes + (e * k + l) * n + c]
+                rise = x[(e + 1) * n + c] - x[e * n + c] - (mesh[e + 1] - mesh[e]) * rise
+                out[continuity + e * n + c] = jumps * rise
     for i in range(n_b):
-        for c in range(end_columns):
-            out[continuity + elements * n + i] += ends[i, c] * at_ends[c]
+        for c in range(n):
+            out[continuity + elements * n + i] += ends[i, c] * x[c] + ends[i, n + c] * x[elements * n + c]
+        for c in range(n_s):
+            out[continuity + elements * n + i] += ends[i, 2 * n + c] * x[scalars + c]
     for q in range(n_i):
         for c in range(n_s):
-            integrals[q] -= targets[q, c] * scalars[c]
+            out[integrals + q] -= targets[q, c] * x[scalars + c]
     return out
 
 
