@@ -6,8 +6,8 @@ its longest steps and with steps that make as many points as its. Then ours with
 AUTO does not offer for boundary value problems, 100 points of Bratu's problem beside PyCont-Lite, and 40 points of the fold
 curve of Chan's problem with its cusp.
 
-Times are processor time on one core, everything compiled, the better of two.
-Run from the root: python -m benchmarks.bench_branch   (about two minutes)
+Times are processor time on one core, everything compiled, the best of five.
+Run from the root: python -m benchmarks.bench_branch   (about three minutes)
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -43,7 +43,7 @@ KEY, END = "ring_amplitude", 4.2
 MESH_TOLERANCE = 1e-4
 """Met by 60 elements all along the branch, so that ours has as many as AUTO."""
 DENSE = 0.069
-"""Largest step that makes as many points as AUTO has with its shorter steps."""
+"""Largest step that makes as many points as AUTO has with its shorter ones."""
 CHAN_CUSP = (4.1909181064, 0.0282060679)
 """(a, b); references/continuation.md, row 5."""
 BRATU_FOLD = 3.513830719125161
@@ -148,9 +148,9 @@ def fold_curve(fold: SingularPoint) -> list[Point | Special]:
 
 
 def timed(work: Callable[[], Made]) -> tuple[Made, float]:
-    """What is made and the better of two processor times, when everything is compiled."""
+    """What is made and the best of five processor times, when everything is compiled."""
     made, seconds = work(), []
-    for _ in range(2):
+    for _ in range(5):
         start = time.process_time()
         made = work()
         seconds.append(time.process_time() - start)
@@ -192,7 +192,7 @@ def print_auto(ours: Branch, seconds: float, step: float) -> None:
     last = ours.points[-1]
     assert isinstance(last.problem, KeyedProblem)
     mine = np.array([last.parameter, *last.problem.base.unpack(last.x).scalars[:2]])
-    run = min((run_auto(directory, step) for _ in range(2)), key=lambda run: run.seconds)
+    run = min((run_auto(directory, step) for _ in range(5)), key=lambda run: run.seconds)
     print(line(f"AUTO-07p, DSMAX {step}", run.points, run.seconds))
     ratio = (len(ours.points) / seconds) / (run.points / run.seconds)
     print(f"    points per second, ours to AUTO's: {ratio:.2f}; whole branches per second: {run.seconds / seconds:.2f}")

@@ -239,16 +239,12 @@ class CollocationProblem(AbstractSmoothProblem):
 
     def _moving(self, points: Array, ends: Array, targets: Array) -> Flags:
         """Unknowns that a matrix without continuity rows acts on, of all points alike."""
-        n = self.n
-        at_points, at_ends, shape = (
-            np.any(points, axis=(0, 2, 3)),
-            np.any(ends, axis=0),
-            (self.elements, self.degree, 1),
-        )
+        n, inside = self.n, (self.elements, self.degree, 1)
+        at_points, at_ends = np.any(points, axis=(0, 2, 3)), np.any(ends, axis=0)
         slope, algebraic, field, scalar = np.split(at_points, np.cumsum([n, self.n_rows - n, n]))
         field |= at_ends[:n] | at_ends[n : 2 * n]
         scalar |= at_ends[2 * n :] | np.any(targets, axis=0)
-        parts = (field, (self.elements + 1, 1)), (slope | field, shape), (algebraic, shape), (scalar, 1)
+        parts = (field, (self.elements + 1, 1)), (slope | field, inside), (algebraic, inside), (scalar, 1)
         return np.concatenate([np.tile(flags, times).ravel() for flags, times in parts])
 
     def _product(self, blocks: Sequence[Array], jumps: float) -> Callable[[Array], Array]:
