@@ -38,7 +38,8 @@ from shapespace.study.diagram_store import DiagramStore, open_diagram
 from shapespace.study.diagrams import diagram, lay_anchors, make_request
 from shapespace.study.grid import Axis, Grid
 from shapespace.study.scenario import Scenario, scenario
-from shapespace.study.steady import Steady, steady, steady_from
+from shapespace.study.settling import settle
+from shapespace.study.steady import Steady, steady, steady_of
 from shapespace.study.tiles import Done, compute_tile, observable_names
 
 PECLET, LENGTH = (25.0, 300.0), (0.1, 10.0)
@@ -97,7 +98,8 @@ def points(count: int) -> None:
     x, y = (np.linspace(*ends, SAMPLE) for ends in (PECLET, LENGTH))
     start, converged = time.process_time(), 0
     for peclet, length in zip(x, y, strict=True):
-        found = steady_from(case.with_overrides({"peclet": peclet, "inverse_hydrodynamic_length": length}), state)
+        at = case.with_overrides({"peclet": peclet, "inverse_hydrodynamic_length": length})
+        found = steady_of(at, settle(at, state))
         converged += found.outcome is Outcome.CONVERGED and bool(found.observables)
     milliseconds = 1e3 * (time.process_time() - start) / SAMPLE
     print(f"loop over single solves from one state: {milliseconds:.1f} ms a point, {converged} of {SAMPLE} converged")

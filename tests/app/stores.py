@@ -10,10 +10,11 @@ from shapespace.study.diagram_store import CODES, OUTCOME, REGIME, Anchors, Diag
 from shapespace.study.diagrams import make_request
 from shapespace.study.engine import Engine
 from shapespace.study.grid import Axis, Grid
+from shapespace.study.named import reference
 from shapespace.study.regimes import Regime
 from shapespace.study.run import run
 from shapespace.study.scenario import Scenario, scenario
-from shapespace.study.steady import observables_at, reference
+from shapespace.study.steady import observables_at
 from shapespace.study.tiles import observable_names
 
 X, Y = "peclet", "inverse_hydrodynamic_length"

@@ -12,10 +12,11 @@ from tests.surfaces import stage_fields
 
 from shapespace.base.outcome import Outcome
 from shapespace.study.branching import branch
+from shapespace.study.engine import state_of
 from shapespace.study.paths import StateName
 from shapespace.study.run import run
 from shapespace.study.scenario import scenario
-from shapespace.study.steady import Steady, follow, solve_steady, state_of
+from shapespace.study.steady import Steady, follow, steady
 
 PROLATE, OBLATE, STOMATOCYTE = StateName.PROLATE, StateName.OBLATE, StateName.STOMATOCYTE
 BALL = 4.0 * np.pi / 3.0
@@ -25,7 +26,7 @@ CASES = [(0.8, PROLATE), (0.65, OBLATE), (0.6, STOMATOCYTE)]
 @cache
 def shape(volume: float, name: StateName, **keys: float) -> Steady:
     """The state of this name, which must be there."""
-    found = solve_steady(scenario("vesicle", reduced_volume=volume, **keys), name)
+    found = steady(scenario("vesicle", reduced_volume=volume, **keys), state=name)
     assert found.outcome is Outcome.CONVERGED
     return found
 
@@ -177,7 +178,7 @@ def test_flat_oblates_pass_through_themselves():
     assert (fork.n_unstable_before, fork.n_unstable_after) == (0, 1)
     assert fork.parameter_error < 1e-7
     assert 0.0 <= end.observables["height"] < 1e-5
-    assert solve_steady(scenario("vesicle", reduced_volume=0.48), OBLATE).outcome is Outcome.SELF_INTERSECTING
+    assert steady(scenario("vesicle", reduced_volume=0.48), state=OBLATE).outcome is Outcome.SELF_INTERSECTING
 
 
 @pytest.mark.slow
@@ -197,7 +198,7 @@ def test_stomatocytes_begin_at_a_fold(tmp_path):
     back = branch(finer, "reduced_volume", 0.67, origin=tmp_path / "cups", stability=False)
     again = next(point for point in back.special_points if point.kind == "fold")
     assert again.parameter == pytest.approx(fold.parameter, abs=1e-6)
-    above = solve_steady(scenario("vesicle", reduced_volume=fold.parameter + 1e-3), STOMATOCYTE)
+    above = steady(scenario("vesicle", reduced_volume=fold.parameter + 1e-3), state=STOMATOCYTE)
     assert above.outcome is Outcome.NO_STATE
     assert "reach up to" in above.detail
 

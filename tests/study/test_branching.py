@@ -20,7 +20,7 @@ from shapespace.numerics.newton import solve_root
 from shapespace.study import branching
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.engine import Engine, state_of
-from shapespace.study.steady import NEWTON
+from shapespace.study.paths import NEWTON
 
 SWIMMER = {"elements": 20}
 

@@ -7,11 +7,12 @@ import pytest
 
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
+from shapespace.study.engine import state_of
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.search_store import Search, open_search
 from shapespace.study.searching import search_states
 from shapespace.study.starts import find_start, find_starts
-from shapespace.study.steady import state_of, steady
+from shapespace.study.steady import steady
 
 
 def swimmer(peclet: float = 24.0) -> Scenario:

@@ -6,8 +6,9 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.polynomial.polynomial import polyval
+from numpy.polynomial.polynomial import polyder, polyval
 
+from shapespace.analysis.beside import beside_branch_point
 from shapespace.analysis.branch import (
     Direction,
     Point,
@@ -88,10 +89,15 @@ def start_point(
 ) -> Point | Outcome:
     """The first point of a branch at a solution x, from which the parameter rises (direction 1) or falls (-1).
 
-    tangent (n + 1,): where several branches meet, that of the one to follow. Without it they must not meet: SINGULAR.
+    tangent (n + 1,): where several branches meet, that of the one to follow. Without it the one of them that changes least as
+    the parameter does; SINGULAR where there is none.
     """
     point = Point(problem, x, p, index, np.append(np.zeros_like(x), 1.0), step=options.first, label="start")
     weights, X = metric(problem, point.joined, options.parameter_scale), point.joined
+    along = direction * point.tangent if tangent is None else tangent
+    beside = beside_branch_point(problem, X, p, index, along, options.parameter_scale)
+    if beside is not None:
+        return replace(point, x=beside.X[:-1], tangent=beside.tangent, test=beside.test)
     # At a fold no plane of constant parameter will do, but almost any other.
     generic = np.random.default_rng(0).standard_normal(len(X))
     for guess in (point.tangent, generic) if tangent is None else (tangent,):
@@ -216,7 +222,7 @@ class _Trial:
         found = direction_at(plane, root.x, self.now.p, root.linearisation)
         if found is None:
             return None
-        point = self._point(plane, root.x, found)
+        point = self._point(root.x, found)
         lengths = np.sqrt((self.row @ self.now.tangent) * (self.metric @ point.tangent**2))
         turn = float(np.arccos(np.minimum(self.row @ point.tangent / lengths, 1.0))) / options.turn
         if not turn <= 1.0 or _hides_folds(self.now, point):
@@ -265,7 +271,14 @@ class _Trial:
         """The exact point of a stop near arclength s on the way to an end; None where Newton fails or ends far off."""
         now = self.now
         cubic = hermite(self.X, now.tangent, end.joined, end.tangent, end.arclength - now.arclength)
-        guess = np.asarray(polyval(s, cubic))
+        guess, is_key = np.asarray(polyval(s, cubic)), stop.measure == Parameter(now.index)
+        if is_key:
+            guess[-1] = stop.value
+            scale, along = self.options.parameter_scale, np.asarray(polyval(s, polyder(cubic)))
+            beside = beside_branch_point(now.problem, guess, now.p, now.index, along, scale)
+            if beside is not None:
+                point = self._point(beside.X, Direction(beside.tangent, beside.test))
+                return replace(point, step=end.step, label=stop.label)
         fixed = ExtendedProblem(now.problem, (now.index,), (Given(stop.measure, stop.value),))
         root = solve_root(fixed, guess, now.p, REST, self.newton)
         if root.outcome is not Outcome.CONVERGED:
@@ -273,23 +286,24 @@ class _Trial:
         X = root.x
         if fixed.norm(X - guess, X) > WORST_MISS * self.options.prediction:
             return None
-        if stop.measure == Parameter(now.index):
+        if is_key:
             X[-1] = stop.value
         found = direction_at(orthogonal_plane(now, self.row, X), X, now.p)
         if found is None:
             return None
-        point = self._point(fixed, X, found)
+        point = self._point(X, found)
         return replace(point, step=end.step, iterations=root.iterations, jacobians=root.jacobians, label=stop.label)
 
-    def _point(self, problem: ExtendedProblem, X: Array, found: Direction) -> Point:
+    def _point(self, X: Array, found: Direction) -> Point:
         """A point at X, its arclength by the chord in the metrics of both of its ends."""
-        x, p = problem.split(X, self.now.p)
+        p = self.now.p.copy()
+        p[self.now.index] = X[-1]
         there = metric(self.now.problem, X, self.options.parameter_scale)
         chord = (X - self.X) ** 2
         length = 0.5 * (np.sqrt(self.metric @ chord) + np.sqrt(there @ chord))
         unit = found.tangent / np.sqrt(there @ found.tangent**2)
         arclength = self.now.arclength + float(length)
-        return Point(self.now.problem, x, p, self.now.index, unit, arclength, test=found.test)
+        return Point(self.now.problem, X[:-1], p, self.now.index, unit, arclength, test=found.test)
 
 
 def _hides_folds(start: Point, end: Point) -> bool:

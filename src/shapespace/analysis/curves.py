@@ -21,7 +21,7 @@ import numpy as np
 from shapespace.analysis.bifurcation import LARGEST_GAP, LOCATION, SAFETY, SingularPoint, branch_directions
 from shapespace.analysis.branch import Point, direction_at, metric, orthogonal_plane, test_on
 from shapespace.analysis.continuation import Arclength, Continuation, start_point
-from shapespace.analysis.passage import is_symmetric, point_between
+from shapespace.analysis.passage import find_zero, is_symmetric, point_between
 from shapespace.analysis.singular import Kernel, SingularProblem, probe
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -269,8 +269,8 @@ def locate(before: Point, after: Point, function: Function) -> float | None:
         return float("nan") if place is None else function(place)
 
     if function is not regularity:
-        return _searched(at, BRACKET)
-    share = _searched(lambda place: float(np.nan_to_num(at(place))), ASIDE)
+        return find_zero(at, BRACKET)
+    share = find_zero(lambda place: float(np.nan_to_num(at(place))), ASIDE)
     if share is None:
         return None
     places = share + ASIDE * np.array([-2.0, -1.0, 1.0, 2.0])
@@ -278,23 +278,6 @@ def locate(before: Point, after: Point, function: Function) -> float | None:
     if not (np.sign(values) == np.sign(values[0]) * np.array([1.0, 1.0, -1.0, -1.0])).all():
         return None
     return float(np.polynomial.Polynomial.fit(values, places, 3)(0.0))
-
-
-def _searched(at: Callable[[float], float], bracket: float) -> float | None:
-    """A zero between 0 and 1 by the Illinois method, to a bracket of this length; None where it is not found."""
-    low, high = (0.0, at(0.0)), (1.0, at(1.0))
-    scale = max(abs(low[1]), abs(high[1]))
-    if not (low[1] * high[1] <= 0.0 and scale > 0.0):
-        return None
-    for _ in range(60):
-        share = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
-        value = at(share)
-        if np.isnan(value):
-            return None
-        low, high = (high if value * high[1] < 0.0 else (low[0], 0.5 * low[1])), (share, value)
-        if abs(high[0] - low[0]) <= bracket or abs(value) <= 1e-12 * scale:
-            return share
-    return None
 
 
 def _place(before: Point, after: Point, share: float) -> Point | None:

@@ -52,6 +52,23 @@ def point_between(before: Point, after: Point, share: float) -> Point | None:
     return Point(problem, x, p, after.index, tangent, start.arclength + share * length, step=after.step)
 
 
+def find_zero(at: Callable[[float], float], bracket: float) -> float | None:
+    """A zero between 0 and 1 by the Illinois method, to a bracket of this length; None where it is not found."""
+    low, high = (0.0, at(0.0)), (1.0, at(1.0))
+    scale = max(abs(low[1]), abs(high[1]))
+    if not (low[1] * high[1] <= 0.0 and scale > 0.0):
+        return None
+    for _ in range(60):
+        share = (low[0] * high[1] - high[0] * low[1]) / (high[1] - low[1])
+        value = at(share)
+        if np.isnan(value):
+            return None
+        low, high = (high if value * high[1] < 0.0 else (low[0], 0.5 * low[1])), (share, value)
+        if abs(high[0] - low[0]) <= bracket or abs(value) <= 1e-12 * scale:
+            return share
+    return None
+
+
 def first_change(before: Point, after: Point, holds: Callable[[Point], bool]) -> tuple[Point, Point]:
     """Two close points between which something starts to hold that holds at the end and not at the start."""
     low, high = before, after

@@ -7,11 +7,15 @@ import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
 
 from shapespace.analysis.bifurcation import Kind, SingularPoint, locate_branch_point, locate_fold
-from shapespace.analysis.branch import Bracket, Point, brackets, hermite, metric, real_roots
+from shapespace.analysis.branch import Bracket, Point, brackets, hermite, metric, real_roots, test_on
 from shapespace.analysis.continuation import Continuation
+from shapespace.analysis.passage import find_zero, point_between
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import AbstractSmoothProblem
+
+CLOSE = 1e-6
+"""Shares of the way between two neighbours to which a change of sign is told."""
 
 
 @dataclass(frozen=True)
@@ -56,21 +60,50 @@ def _turns(point: SingularPoint) -> bool:
 
 def _located(bracket: Bracket) -> Located | Missed:
     """Locate the singular point of a bracket, on the discretisation of its end."""
-    problem = bracket.after.problem
+    outcome = Outcome.DIVERGED
+    for X, tangent in _guesses(bracket):
+        point = _solved(bracket, X, tangent)
+        if isinstance(point, Outcome):
+            outcome = point
+        elif _is_inside(bracket, point):
+            return Located(point, bracket)
+    return Missed(bracket, outcome)
+
+
+def _guesses(bracket: Bracket) -> Iterator[tuple[Array, Array]]:
+    """(x, parameter) and unit tangents near the singular point, the cheapest first."""
+    yield between(bracket)
+    if bracket.kind == "branch-point":
+        # Where all along the branch another direction is nearly annulled, the null vector stands out only close by.
+        place = _sign_change(bracket)
+        if place is not None:
+            yield place.joined, place.tangent
+
+
+def _sign_change(bracket: Bracket) -> Point | None:
+    """Where the test function of branch points changes its sign; None where it cannot be told."""
+    before, after = bracket.before, bracket.after
+
+    def at(share: float) -> float:
+        place = point_between(before, after, share)
+        return 0.0 if place is None else float(np.nan_to_num(test_on(place, after.problem)))
+
+    share = find_zero(at, CLOSE)
+    return None if share is None else point_between(before, after, share)
+
+
+def _solved(bracket: Bracket, X: Array, tangent: Array) -> SingularPoint | Outcome:
+    """The singular point near X, or why it is not found."""
+    problem, index = bracket.after.problem, bracket.after.index
     assert isinstance(problem, AbstractSmoothProblem)
-    X, tangent = between(bracket)
-    p = bracket.after.p.copy()
-    p[bracket.after.index] = X[-1]
-    index, x = bracket.after.index, X[:-1]
-    point: SingularPoint | Outcome = Outcome.DIVERGED
+    x, p = X[:-1], bracket.after.p.copy()
+    p[index] = X[-1]
     if bracket.kind == "fold":
         point = locate_fold(problem, index, x, p, tangent[:-1])
-    if isinstance(point, Outcome):
-        # Where the parameter turns at a pitchfork, F_p lies in the range of F_x, and a fold's defining system is singular.
-        point = locate_branch_point(problem, index, x, p, tangent)
-    if isinstance(point, Outcome):
-        return Missed(bracket, point)
-    return Located(point, bracket) if _is_inside(bracket, point) else Missed(bracket, Outcome.DIVERGED)
+        if not isinstance(point, Outcome):
+            return point
+    # Where the parameter turns at a pitchfork, F_p lies in the range of F_x, and a fold's defining system is singular.
+    return locate_branch_point(problem, index, x, p, tangent)
 
 
 def _is_inside(bracket: Bracket, point: SingularPoint) -> bool:

@@ -25,8 +25,9 @@ from shapespace.study.landmarks import Surveyor, physical_end
 from shapespace.study.paths import MAX_POINTS, StateName, state_names
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
+from shapespace.study.settling import key_values
 from shapespace.study.starts import Start, find_start
-from shapespace.study.steady import Steady, key_values, steady, steady_near
+from shapespace.study.steady import Steady, steady, steady_near
 
 FIRST_STEP = 0.02
 ENDS = (

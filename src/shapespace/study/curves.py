@@ -31,8 +31,8 @@ from shapespace.study.keyed import KeyedProblem
 from shapespace.study.keys import MODELS
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
+from shapespace.study.settling import key_values
 from shapespace.study.starts import Start, find_start
-from shapespace.study.steady import key_values
 
 AT_VALUE = 1e-9
 """A start this near to a bound, relative to it (or one), is there."""

@@ -17,11 +17,13 @@ from shapespace.study.cluster import Cluster
 from shapespace.study.diagram_store import CODES, Anchors, Diagram, DiagramRequest, DiagramStore, open_diagram
 from shapespace.study.grid import Axis, Grid
 from shapespace.study.keyed import KeyedProblem
+from shapespace.study.named import check_has_isolated_states
 from shapespace.study.paths import StateName, read_state_name
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
+from shapespace.study.settling import key_values
 from shapespace.study.starts import Start, find_starts
-from shapespace.study.steady import check_has_isolated_states, key_values, solve_steady, steady_near
+from shapespace.study.steady import steady, steady_near
 from shapespace.study.tiles import Done, Surveyor, observable_names
 from shapespace.study.workers import Workers, available_cores
 
@@ -206,11 +208,11 @@ def _skeleton(scenario: Scenario, grid: Grid, name: StateName) -> tuple[Sweep, O
         at = max(missing, key=lambda one: _remoteness(places[one], seen, known))
         tried.append(places[at])
         keys = dict(zip(grid.keys, values[at].tolist(), strict=True))
-        steady = solve_steady(scenario.with_overrides(keys), name)
-        if not steady.outcome.is_success:
-            failure = steady.outcome if steady.outcome in CODES else Outcome.NO_STATE
+        found = steady(scenario.with_overrides(keys), state=name)
+        if not found.outcome.is_success:
+            failure = found.outcome if found.outcome in CODES else Outcome.NO_STATE
             continue
-        start = surveyor.state(steady.problem.base.mesh, steady.found.x, sweep.p(at))
+        start = surveyor.state(found.problem.base.mesh, found.found.x, sweep.p(at))
         sweep.begin(at, start)
         sweep.spread(at)
     return sweep, failure

@@ -16,21 +16,15 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, frame_of, state_of
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.landmarks import physical_end
+from shapespace.study.named import check_has_isolated_states, reference
 from shapespace.study.paths import NEWTON, own_states
 from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import Search, SearchStore, Tried
+from shapespace.study.settling import key_values
 from shapespace.study.spectra import spectrum_at
 from shapespace.study.starts import Start, find_starts
-from shapespace.study.steady import (
-    Rates,
-    check_has_isolated_states,
-    key_values,
-    observables_at,
-    reference,
-    steady,
-    steady_near,
-)
+from shapespace.study.steady import Rates, observables_at, steady, steady_near
 
 MAX_TRIES = 200
 DRIVING = ("reduced_volume", "ring_amplitude", "peclet", "spontaneous_curvature", "pulling_force")

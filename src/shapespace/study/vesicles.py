@@ -11,7 +11,7 @@ from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Continuation, Stop, start_point
 from shapespace.analysis.extended import Parameter
 from shapespace.analysis.stationary import Stationary, solve_stationary
-from shapespace.analysis.tracing import Located, side_branches, traced
+from shapespace.analysis.tracing import Located, Missed, side_branches, traced
 from shapespace.base.outcome import Outcome
 from shapespace.study.engine import Engine
 from shapespace.study.keyed import KeyedProblem
@@ -53,6 +53,9 @@ def _cup(oblate: Point, goal: float) -> tuple[Stationary, str]:
     branch = Continuation([oblate], [stop], steps(1.0), NEWTON)
     last = oblate
     for one in traced(branch):
+        if isinstance(one, Missed):
+            told = f"A branch point of the oblates below {KEY} = {last.parameter:.8g} was not located."
+            return given_up(last, one.outcome), told
         if isinstance(one, Located) and one.point.kind is Kind.PITCHFORK:
             return _beyond_fold(side_branches(one.point, one.bracket.after.tangent, 0.02)[0], goal)
         last = one if isinstance(one, Point) else last
