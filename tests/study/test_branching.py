@@ -17,7 +17,7 @@ from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import REST
 from shapespace.numerics.newton import solve_root
-from shapespace.study import branching
+from shapespace.study import landmarks
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.paths import NEWTON
@@ -169,7 +169,7 @@ def test_a_branch_ends_where_the_surface_first_touches_itself(monkeypatch: pytes
     def crossing(point: Point) -> Outcome | None:
         return Outcome.SELF_INTERSECTING if point.parameter > 21.3 else None
 
-    monkeypatch.setattr(branching, "physical_end", crossing)
+    monkeypatch.setattr(landmarks, "physical_end", crossing)
     case = ss.scenario("polar-swimmer", **SWIMMER)
     found = ss.branch(case, "peclet", 30.0, start=21.0, state="trivial", stability=False)
     assert found.outcome is Outcome.SELF_CONTACT
@@ -212,7 +212,7 @@ def test_a_finished_branch_is_left_as_it_is(store: Path):
         ({"start": 30.0}, "must differ from the start"),
         ({"stop": float("nan")}, "must be a finite number"),
         ({"key": "friction", "stop": -1.0}, "friction = -1: must be >= 0"),
-        ({"key": "friction", "start": 0.5, "at": (-2.0,)}, "friction = -2: must be >= 0"),
+        ({"key": "friction", "start": 0.5, "at": (-2.0,)}, "--at -2: lies outside 0.5 to 30"),
         ({"origin": "absent:fold-1"}, "is not a directory"),
         ({"origin": "{store}:fold-7"}, "fold-7: is no label of this branch; choose one of start, user-1"),
         ({"origin": "{store}:user-1", "side": 1}, "is no pitchfork"),

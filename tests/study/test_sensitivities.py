@@ -15,9 +15,8 @@ from shapespace.base.errors import InputError
 from shapespace.numerics.collocation import CollocationLinearisation
 from shapespace.numerics.newton import Newton
 from shapespace.study.engine import Engine
-from shapespace.study.measures import blank_row
+from shapespace.study.rows import blank_row, place_moves
 from shapespace.study.scenario import scenario
-from shapespace.study.sensitivities import place_moves
 from shapespace.study.steady import Steady, observables_at, steady
 
 PLACES = np.array([0.0, 0.11, 0.5, 0.83, 1.0])

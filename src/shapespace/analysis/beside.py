@@ -17,8 +17,10 @@ from shapespace.base.problem import AbstractContinuableProblem, AbstractSmoothPr
 BESIDE = 1e-5
 """A state at most this far from a branch point, in the metric, lies beside it."""
 AWAY = 1e-3
-"""In the metric: so far from a branch point the determinant's sign is beyond doubt. A state with its very parameter that is
-nearer is the branch point, since F tells it from there by the third power of the distance only."""
+"""In the metric: so far from a branch point the determinant's sign is beyond doubt."""
+BLURRED = 3e-2
+"""A state with the very parameter of a pitchfork, this far from it in the metric, is the pitchfork: F grows with the third power
+of the distance only, so that Newton's method ends anywhere about it."""
 SUSPICIOUS = 1e-2
 """Ratio of the test function at a state to that a step AWAY below which a branch point is looked for."""
 AT_POINT = 1e-9
@@ -50,17 +52,15 @@ def beside_branch_point(
         return None
     weights = metric(problem, X, parameter_scale)
     row = weights * along
-    moved = X + AWAY * along / np.sqrt(row @ along)
-    here, there = (_direction(problem, place, p, index, row) for place in (X, moved))
+    here, there = (_direction(problem, place, p, index, row) for place in (X, _away(X, along, weights)))
     if there is None or (here is not None and abs(here.test) > SUSPICIOUS * abs(there.test)):
         return None
-    unit = there.tangent / np.sqrt(weights @ there.tangent**2)
-    point = _located(problem, moved, p, index, unit)
-    if point is None:
+    point = branch_point_near(problem, X, p, index, along, parameter_scale)
+    if isinstance(point, Outcome):
         return None
     home, way = np.append(point.x, point.parameter), float(X[-1]) - point.parameter
     is_there = abs(way) <= AT_POINT * max(abs(point.parameter), 1.0)
-    if np.sqrt(weights @ (X - home) ** 2) > (AWAY if is_there else BESIDE):
+    if np.sqrt(weights @ (X - home) ** 2) > (BLURRED if is_there else BESIDE):
         return None
     directions = point.directions / np.sqrt(point.directions**2 @ weights)[:, None]
     tangent = directions[np.argmax(np.abs(directions @ row))]
@@ -73,17 +73,31 @@ def beside_branch_point(
     return None if beyond is None else Beside(state, tangent, beyond.test * share / AWAY)
 
 
+def branch_point_near(
+    problem: AbstractSmoothProblem, X: Array, p: Array, index: int, along: Array, parameter_scale: float = 0.0
+) -> SingularPoint | Outcome:
+    """The branch point near X (n + 1,), on a branch that goes about `along`; an Outcome says why there is none.
+
+    X may be the point itself: it is looked for from a place AWAY, where the null vector stands out and the tangent is known.
+    """
+    weights = metric(problem, X, parameter_scale)
+    place = _away(X, along, weights)
+    found = _direction(problem, place, p, index, weights * along)
+    if found is None:
+        return Outcome.SINGULAR
+    unit = found.tangent / np.sqrt(weights @ found.tangent**2)
+    return locate_branch_point(problem, index, place[:-1], _full(place, p, index), unit)
+
+
+def _away(X: Array, along: Array, weights: Array) -> Array:
+    return np.asarray(X + AWAY * along / np.sqrt(weights @ along**2))
+
+
 def _direction(problem: AbstractContinuableProblem, X: Array, p: Array, index: int, row: Array) -> Direction | None:
     """The direction at X across a plane."""
     full = _full(X, p, index)
     point = Point(problem, X[:-1], full, index, row)
     return direction_at(orthogonal_plane(point, row, X), X, full)
-
-
-def _located(problem: AbstractSmoothProblem, X: Array, p: Array, index: int, tangent: Array) -> SingularPoint | None:
-    """The branch point near X, if one is found."""
-    found = locate_branch_point(problem, index, X[:-1], _full(X, p, index), tangent)
-    return None if isinstance(found, Outcome) else found
 
 
 def _full(X: Array, p: Array, index: int) -> Array:

@@ -322,13 +322,17 @@ def _hides_folds(start: Point, end: Point) -> bool:
 
 
 def _course(measure: AbstractMeasure, start: Point, end: Point) -> Array:
-    """The measure from start to end as a cubic (4,) in arclength from the start."""
-    ends = []
+    """The measure from start to end as a cubic (4,) in arclength from the start; a line where it is NaN at one end."""
+    ends, length = [], end.arclength - start.arclength
     for point in (start, end):
         row, parameters = measure.gradient(point.problem, point.x, point.p)
         slope = row @ point.tangent[:-1] + parameters[point.index] * point.tangent[-1]
         ends += [np.array(measure.value(point.problem, point.x, point.p)), np.array(slope)]
-    return hermite(ends[0], ends[1], ends[2], ends[3], end.arclength - start.arclength)
+    if np.isnan(ends[0]):
+        return np.array([ends[2] - length * ends[3], ends[3], 0.0, 0.0])
+    if np.isnan(ends[2]):
+        return np.array([ends[0], ends[1], 0.0, 0.0])
+    return hermite(ends[0], ends[1], ends[2], ends[3], length)
 
 
 def _crossing(stop: Stop, start: Point, end: Point) -> float | None:
@@ -337,6 +341,8 @@ def _crossing(stop: Stop, start: Point, end: Point) -> float | None:
     if _is_at(stop, end):
         return length
     cubic = _course(stop.measure, start, end)
+    if np.isnan(cubic).any():
+        return None
     cubic[0] -= stop.value
     # A start at the value is no crossing, though round-off puts a root just ahead of it.
     roots = real_roots(cubic, 1e-3 * length if _is_at(stop, start) else 0.0, length)

@@ -129,7 +129,9 @@ def solve_spectrum(
     search = _Search(problem, x, p, options, rest)
     shift = near.next_shift if near is not None and near.converged else search.first_shift()
     last = None
-    for attempt in range(options.max_attempts if np.isfinite(shift) else 0):
+    for attempt in range(options.max_attempts):
+        if np.isinf(shift):
+            return search.spectrum(Outcome.NO_RATES, None, {}, None)
         pairs, shift = search.pairs_from(shift, attempt)
         if pairs is None:
             continue
@@ -188,11 +190,14 @@ class _Search:
             far *= 10.0
 
     def pairs_from(self, shift: float, attempt: int) -> tuple[_Pairs | None, float]:
-        """Verified pairs if the disc around this shift could be made large enough, and the shift to try otherwise."""
+        """Verified pairs if the disc around this shift could be made large enough, and the shift to try otherwise.
+
+        Infinite where no rate is finite.
+        """
         count, most = self.options.count, self.options.max_dimension
         krylov = Krylov(self.pencil(shift), most, attempt)
         if _is_rateless(krylov):
-            return None, 2.0 * shift
+            return None, np.inf
         shift, dimension = krylov.pencil.shift, 4 * count
         while True:
             krylov.extend(dimension)

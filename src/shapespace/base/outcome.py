@@ -19,6 +19,7 @@ class Outcome(StrEnum):
     STEP_UNDERFLOW = "step-underflow"
     MAX_STEPS = "max-steps"
     REACHED_STOP = "reached-stop"
+    TURNED_BACK = "turned-back"
     NOT_REACHED = "not-reached"
     NO_STATE = "no-state"
     BRANCH_STALLED = "branch-stalled"
@@ -32,6 +33,7 @@ class Outcome(StrEnum):
     MAX_STARTS = "max-starts"
     COMPLETE = "complete"
     EIGENVALUES_UNCONVERGED = "eigenvalues-unconverged"
+    NO_RATES = "no-rates"
 
     @property
     def is_success(self) -> bool:
@@ -52,6 +54,7 @@ _SUCCESS = {
     Outcome.SELF_CONTACT,
     Outcome.SELF_INTERSECTING,
     Outcome.REACHED_STOP,
+    Outcome.TURNED_BACK,
     Outcome.NO_MORE_FOUND,
     Outcome.CLOSED,
     Outcome.REJOINED,
@@ -66,7 +69,7 @@ _ADVICE = {
     Outcome.REACHED_END: "The end time was reached; raise `until` or resume to go on.",
     Outcome.NECK_CLOSED: "The neck became thinner than the closing radius: beyond it the surface would split.",
     Outcome.SELF_CONTACT: "The surface touches itself: shapes beyond would pass through themselves.",
-    Outcome.SELF_INTERSECTING: "The surface passes through itself already at the start: choose another one.",
+    Outcome.SELF_INTERSECTING: "The surface passes through itself, as no real one can: choose another state or start.",
     Outcome.MAX_ITERATIONS: "Newton ran out of iterations: start from a nearer state or take a smaller step.",
     Outcome.DIVERGED: "Newton could not reduce the residual: start from a nearer state or take a smaller step.",
     Outcome.SINGULAR: (
@@ -78,6 +81,10 @@ _ADVICE = {
         "The time step fell below its minimum: raise `elements`, loosen `time_tolerance`, or check the parameters."
     ),
     Outcome.REACHED_STOP: "The branch came to a value where it was to end.",
+    Outcome.TURNED_BACK: (
+        "The branch did not come to --stop: it turned, or leads the other way, and ended at its bound there; --both goes on, or "
+        "give another --stop or --side."
+    ),
     Outcome.NOT_REACHED: (
         "Stepping stalled on the way to these parameters: there may be no such state, or a fold lies between; follow the branch."
     ),
@@ -96,12 +103,16 @@ _ADVICE = {
     Outcome.REJOINED: (
         "The branch came from one symmetric state to another: beyond lies the mirror image of what was passed."
     ),
-    Outcome.OUT_OF_RANGE: "The curve leaves the values that a key can take.",
+    Outcome.OUT_OF_RANGE: "Beyond this point a key would have a value that it cannot take.",
     Outcome.UNFOLDED: "The branches part when this key changes, and cross at single values only: choose another key.",
     Outcome.MAX_STARTS: "The limit on starts was reached with others left: raise `--starts` and resume.",
-    Outcome.MAX_STEPS: "The step limit was reached: resume, of a run with a larger `max_steps`.",
+    Outcome.MAX_STEPS: "The limit on steps was reached: resume to go on, a run with a larger `max_steps`.",
     Outcome.COMPLETE: "Every point of the grid was tried; those without a state say why.",
     Outcome.EIGENVALUES_UNCONVERGED: (
         "The leading growth rates did not converge or contradict each other: raise `elements`, or ask for fewer."
+    ),
+    Outcome.NO_RATES: (
+        "Perturbations of this state, such as a flat disc, dissipate nothing to first order and have no finite growth rates: "
+        "look at states beside it."
     ),
 }

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -23,10 +24,16 @@ from shapespace.cli.shared import (
     examples,
     find_scenario,
     finite,
+    kept,
     print_lines,
     read_settings,
+    stored,
     tell,
+    tell_missed,
 )
+
+AS_ASKED = 1e-7
+"""Relative difference by which a point may miss a value of --at: stops at observables are as exact as the states."""
 
 if TYPE_CHECKING:
     from shapespace.study.branch_point import BranchPoint
@@ -120,26 +127,34 @@ def branch_command(
         print(json.dumps(_record(found), allow_nan=False))
     else:
         _summarise(found)
-    return _report(found, stability=not no_stability)
+    return _report(found, values, stability=not no_stability)
 
 
-def _report(found: "Branch", stability: bool) -> int:
-    """Say on stderr what was missed or went wrong; the exit status."""
-    unknown = [point.parameter for point in found.points if point.is_step and point.n_unstable is None]
-    if stability and unknown:
+def _report(found: "Branch", places: Sequence[float | tuple[str, float]], stability: bool) -> int:
+    """Say on stderr what was missed, of `places` too, or went wrong; the exit status."""
+    unknown = [point for point in found.points if stability and point.is_step and point.n_unstable is None]
+    for outcome in dict.fromkeys(Outcome(point.spectrum) for point in unknown):
+        places = [point.parameter for point in unknown if point.spectrum == outcome]
         tell(
-            f"the growth rates of {len(unknown)} points are not known, the first at {found.key} = {unknown[0]:.8g} "
-            f"({Outcome.EIGENVALUES_UNCONVERGED}): {Outcome.EIGENVALUES_UNCONVERGED.advice}"
+            f"the growth rates of {len(places)} points are not known, the first at {found.key} = {places[0]:.8g} "
+            f"({outcome}): {outcome.advice}"
         )
-    for one in found.missed:
-        tell(
+    tell_missed(
+        [
             f"a {one['kind']} between {found.key} = {one['parameter_before']:.8g} and {one['parameter_after']:.8g} was not "
             f"located ({one['outcome']})."
-        )
+            for one in found.missed
+        ]
+    )
+    for place in places:
+        name, value = place if isinstance(place, tuple) else (found.key, place)
+        met = (one.parameter if name == found.key else one.observables.get(name, math.nan) for one in found.points)
+        if not any(math.isclose(one, value, rel_tol=AS_ASKED, abs_tol=AS_ASKED) for one in met):
+            tell(f"--at {name}={value:.8g}: the branch did not come there.")
     if found.outcome is None or found.outcome.is_success:
         return 0
     words = [f"the branch ended early ({found.outcome}): {found.outcome.advice}", found.detail]
-    tell(" ".join([*filter(None, words), f"What there is is in {found.store}."]))
+    tell(" ".join([*filter(None, words), kept(found.store)]))
     return GAVE_UP
 
 
@@ -173,7 +188,7 @@ def _record(found: "Branch") -> dict[str, Any]:
     last = found.points[-1].observables if found.points else {}
     return {
         **described(found.outcome, found.scenario, last),
-        "store": str(found.store),
+        "store": None if found.store is None else str(found.store),
         "vary": found.key,
         "free": found.free,
         "began": found.began,
@@ -228,4 +243,4 @@ def _summarise(found: "Branch") -> None:
     assert found.outcome is not None
     count = sum(point.is_step for point in found.points)
     began = f" from the state {found.began}" if found.began else ""
-    print_lines(table, f"{found.outcome}: {found.outcome.advice}", f"{count} points{began}; stored in {found.store}")
+    print_lines(table, f"{found.outcome}: {found.outcome.advice}", f"{count} points{began}; {stored(found.store)}")

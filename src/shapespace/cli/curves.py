@@ -17,9 +17,12 @@ from shapespace.cli.shared import (
     described,
     examples,
     finite,
+    kept,
     print_lines,
     read_values,
+    stored,
     tell,
+    tell_missed,
 )
 
 if TYPE_CHECKING:
@@ -96,12 +99,14 @@ def curve_command(
 
 def _report(found: "Curve") -> int:
     """Say on stderr what was missed or went wrong; the exit status."""
+    lines = []
     for one in found.missed:
         ends = [_at(found.keys, one[name]) for name in ("parameters_before", "parameters_after")]
-        tell(f"a {one['kind']} between {ends[0]} and {ends[1]} was not located.")
+        lines.append(f"a {one['kind']} between {ends[0]} and {ends[1]} was not located.")
+    tell_missed(lines)
     if found.outcome is None or found.outcome.is_success:
         return 0
-    tell(f"the curve ended early ({found.outcome}): {found.outcome.advice} What there is is in {found.store}.")
+    tell(f"the curve ended early ({found.outcome}): {found.outcome.advice} {kept(found.store)}")
     return GAVE_UP
 
 
@@ -115,7 +120,7 @@ def _record(found: "Curve") -> dict[str, Any]:
     last = found.points[-1].observables if found.points else {}
     return {
         **described(found.outcome, found.scenario, last),
-        "store": str(found.store),
+        "store": None if found.store is None else str(found.store),
         "keys": [*found.keys],
         "kind": found.of,
         "special_points": [
@@ -156,5 +161,5 @@ def _summarise(found: "Curve") -> None:
     print_lines(
         table,
         f"{found.outcome}: {found.outcome.advice}",
-        f"{count} points on a curve of {found.of}s; stored in {found.store}",
+        f"{count} points on a curve of {found.of}s; {stored(found.store)}",
     )

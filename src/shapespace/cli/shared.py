@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from shapespace.study.scenario import Scenario
 
 BAD_INPUT, GAVE_UP, INTERRUPTED = 2, 3, 130
+MOST_MISSED = 3
+"""Lines about one kind of trouble."""
 
 
 def examples(*lines: str) -> str:
@@ -132,6 +134,24 @@ def chosen_scenario(name_or_file: str, changes: Mapping[str, str], start: str | 
     from shapespace.study.starts import find_start
 
     return find_start(start).placing(chosen, changes)
+
+
+def stored(store: Path | None) -> str:
+    """Where results are, for the end of a summary."""
+    return f"stored in {store}" if store else "nothing stored"
+
+
+def kept(store: Path | None) -> str:
+    """Where results are that ended early."""
+    return f"What there is is in {store}." if store else "Nothing was stored."
+
+
+def tell_missed(lines: Sequence[str]) -> None:
+    """Say what was not located: the first few, and how many more there are."""
+    for line in lines[:MOST_MISSED]:
+        tell(line)
+    if len(lines) > MOST_MISSED:
+        tell(f"and {len(lines) - MOST_MISSED} more; all are in the JSON and in the store.")
 
 
 def described(outcome: "Outcome", scenario: "Scenario", observables: Mapping[str, float]) -> dict[str, object]:

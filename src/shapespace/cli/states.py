@@ -86,7 +86,7 @@ def steady_command(
     else:
         _summarise(found, rates, slopes, out)
     if not found.outcome.is_success:
-        tell(f"no stationary state found ({found.outcome}): {found.outcome.advice} {found.nearest}")
+        tell(f"no stationary state found ({found.outcome}): {found.outcome.advice} Reached: {found.nearest}")
         return GAVE_UP
     if rates is not None and not rates.outcome.is_success:
         tell(f"the growth rates are not known ({rates.outcome}): {rates.outcome.advice}")

@@ -34,6 +34,8 @@ NOTABLE = 0.1
 """A new direction that is a larger part of its image needs no second orthogonalisation, which is always enough."""
 INFINITE = 1e-8
 """Eigenvalues of S smaller than this part of the largest are zero but for round-off: their rates are infinite."""
+NOTHING = 1e-9
+"""A start that the finite part of S shrinks to a smaller part of itself, in units of 1/shift, meets round-off alone."""
 UNSEEN = 1e-4
 """Mean square weight of entries that the problem's inner product leaves out: slopes and fields known at points only."""
 
@@ -112,12 +114,12 @@ class Krylov:
         self._images = np.empty((capacity, n))
         self._matrix = np.zeros((capacity + 1, capacity))
         # Random, so that no mode is left out: from a start of one parity the others would never appear.
-        start = pencil.apply(pencil.apply(np.random.default_rng(seed).standard_normal(n)))
-        reduced = self._roots * start[self._moving]
+        random = np.random.default_rng(seed).standard_normal(n)
+        reduced = self._roots * pencil.apply(pencil.apply(random))[self._moving]
         size = np.linalg.norm(reduced)
-        if size > 0.0:
+        self.is_invariant = not abs(pencil.shift) * size > NOTHING * pencil.size(random)
+        if not self.is_invariant:
             self._basis[0] = reduced / size
-        self.is_invariant = not size > 0.0
 
     def extend(self, dimension: int) -> None:
         """Apply S until the space has this dimension, or is invariant."""

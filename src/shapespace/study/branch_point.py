@@ -22,8 +22,8 @@ class BranchPoint:
     errors (m,), parities and names of neutral ones by place; modes (m, n), of labelled points only. n_unstable: None where
     unknown. label, kind: of special points, else empty. is_step: one of the continuation's own points, not one located
     between them. ends: outcome with which the leg ends here, else empty. missed: brackets before this point in which nothing
-    was found. began: of the first point, the name of the state, or the store, that it comes from. freed: value of the key that
-    answers where an observable is the parameter.
+    was found. spectrum: how the search for growth rates ended, empty where there was none. began: of the first point, the name
+    of the state, or the store, that it comes from. freed: value of the key that answers where an observable is the parameter.
     """
 
     frame: Frame
@@ -50,6 +50,7 @@ class BranchPoint:
     ends: str = ""
     missed: tuple[dict[str, Any], ...] = ()
     began: str = ""
+    spectrum: str = ""
     freed: float | None = None
 
     @property
@@ -74,7 +75,7 @@ _LAYOUT = Layout(
     arrays=("tangent", "directions", "growth_rates", "growth_rate_errors", "modes"),
     words=(
         "parities", "neutral", "n_unstable", "n_unstable_before", "n_unstable_after", "leg", "label", "kind", "is_step", "ends",
-        "missed", "began", "freed",
+        "missed", "began", "freed", "spectrum",
     ),
 )  # fmt: skip
 

@@ -7,9 +7,13 @@ import numpy as np
 from shapespace.analysis.continuation import Stop
 from shapespace.analysis.extended import Parameter
 from shapespace.base.errors import InputError
+from shapespace.base.outcome import Outcome
 from shapespace.study.course import Course
 from shapespace.study.measures import make_observable
 from shapespace.study.scenario import Scenario
+
+FARTHEST = 10.0
+"""Of the way to the stop: how far a branch that leaves another one may lead the other way."""
 
 
 @dataclass(frozen=True)
@@ -20,7 +24,7 @@ class Request:
 
     origin: stored state to begin at, as text; without it the state of this name, or the default one, or where there is none
     the trivial one. side: 1 or -1 for either way along the other branch through a stored branch
-    point, 0 for the branch itself. both: also the other way, as far as from stop to start on the other side. stability:
+    point, 0 for the branch itself. both: also the other way, as far as from start to stop on the other side. stability:
     growth rates at every point.
     """
 
@@ -50,6 +54,10 @@ class Request:
         for name, value in (("--start", self.start), ("--stop", self.stop), *at):
             if not np.isfinite(value):
                 raise InputError(f"{name} {value}: must be a finite number; give one.")
+        low, high = min(self.bounds), max(self.bounds)
+        for one in self.at:
+            if isinstance(one, float) and not low <= one <= high:
+                raise InputError(f"--at {one:g}: lies outside {low:g} to {high:g}; choose a value between.")
 
     @property
     def course(self) -> Course:
@@ -63,7 +71,7 @@ class Request:
 
     def stops(self, scenario: Scenario) -> list[Stop]:
         """The ends and the exact points."""
-        stops = [Stop(Parameter(0), value, "end", ends=True) for value in dict.fromkeys(self.bounds)]
+        stops = [Stop(Parameter(0), value, "end", ends=True) for value in self.bounds]
         stops += [Stop(Parameter(0), value, "user") for value in self.values]
         for name, value in (one for one in self.at if not isinstance(one, float)):
             stops.append(Stop(make_observable(scenario, name, self.course.moved), value, "user"))
@@ -76,9 +84,13 @@ class Request:
 
     @property
     def bounds(self) -> tuple[float, ...]:
-        """Values of the key at which the branch ends."""
-        other = 2.0 * self.start - self.stop if self.both else self.start
-        return (self.stop,) if self.side else (self.stop, other)
+        """Values of the key at which the branch ends: the stop, and one for a branch that does not come there."""
+        reach = FARTHEST if self.side else 1.0 if self.both else 0.0
+        return tuple(dict.fromkeys((self.stop, self.start + reach * (self.start - self.stop))))
+
+    def ending(self, value: float) -> Outcome:
+        """How a branch ends that comes to a bound."""
+        return Outcome.REACHED_STOP if self.both or value == self.stop else Outcome.TURNED_BACK
 
     @property
     def span(self) -> float:

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from shapespace.base.errors import InputError
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.study.keyed import HeldProblem, KeyedProblem
-from shapespace.study.measures import make_observable
+from shapespace.study.keys import MAIN_KEYS
+from shapespace.study.measures import make_observable, observed_names
 from shapespace.study.scenario import Scenario
 
 
@@ -23,6 +24,11 @@ class Course:
 
     def check(self, scenario: Scenario) -> None:
         """InputError where this cannot vary."""
+        if self.free is None and self.key not in scenario.values() and self.key in observed_names(scenario):
+            raise InputError(
+                f"--vary {self.key}: is an observable; give as --free the key that is to answer, such as "
+                f"{MAIN_KEYS[scenario.kind]}."
+            )
         if self.free is None:
             KeyedProblem.of(scenario, (self.key,))
         elif self.key in scenario.values():

@@ -22,8 +22,8 @@ from shapespace.analysis.extended import Parameter
 from shapespace.analysis.passage import first_change, passed_start
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
+from shapespace.study.branch_starts import FIRST_STEP
 from shapespace.study.branch_store import START
-from shapespace.study.branching import FIRST_STEP
 from shapespace.study.curve_recorder import Recorder
 from shapespace.study.curve_store import Curve, CurvePoint, CurveStore, collected
 from shapespace.study.engine import state_of
@@ -149,7 +149,11 @@ def curve(
             points.append(point)
 
         if store.outcome is None or not store.outcome.is_success:
-            store.finish(_follow(scenario, request, singular, points, keep, progress))
+            outcome = _follow(scenario, request, singular, points, keep, progress)
+            if not points:
+                store.discard()
+                return collected(scenario, request.keys, points, outcome, None)
+            store.finish(outcome)
         return collected(scenario, request.keys, points, store.outcome, store.path)
 
 

@@ -2,14 +2,19 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from shapespace.analysis.beside import AT_POINT, AWAY
+from shapespace.analysis.bifurcation import Kind
 from shapespace.analysis.branch import Point, metric
-from shapespace.analysis.passage import Hopf, growing_pairs, locate_hopf
+from shapespace.analysis.passage import Hopf, growing_pairs, locate_hopf, point_between
 from shapespace.analysis.stability import Disc, Spectrum
 from shapespace.analysis.tracing import Located, Missed, singular_points
+from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import START
@@ -46,28 +51,43 @@ class Surveyor:
         self._ahead: tuple[Point, Spectrum | None] | None = None
         self._missed: list[dict[str, Any]] = []
         self._stored = 0
+        self._beyond: int | None = None
 
     def begin(self, leg: int, done: Sequence[BranchPoint]) -> None:
         """Go on with a leg after the points that are there."""
         self._leg = leg
         steps = [i for i, point in enumerate(done) if point.is_step and (point.leg == leg or point.label == START)]
-        self._last = self._near = self._spectrum_of(done[steps[-1]])
+        last = done[steps[-1]]
+        self._near = self._spectrum_of(last)
+        met = done[steps[-1] - 1]
+        beyond = met.n_unstable_before if leg else met.n_unstable_after
+        is_met = not met.is_step and met.kind in {*Kind} and _is_at(met.parameter, last.parameter)
+        self._last = _counting(self._near, beyond if is_met else None)
         self._stored = len([point for point in done[steps[-1] + 1 :] if point.leg == leg])
 
     def start(self, point: Point, began: str) -> BranchPoint:
         """The record of the first point."""
         return self._record(point, self._spectrum(point), label=START, kind=START, began=began)
 
-    def step(self, point: Point) -> BranchPoint:
-        """The record of a point that continuation came to."""
+    def end_of(self, point: Point) -> Outcome | None:
+        """Why the branch ends before a point, if so."""
+        assert isinstance(point.problem, KeyedProblem | HeldProblem)
+        try:
+            self.course.scenario_at(self.scenario, point.problem.key_value(point.x, point.p))
+        except InputError:
+            return Outcome.OUT_OF_RANGE
+        return physical_end(point)
+
+    def step(self, point: Point, ends: Outcome | None) -> BranchPoint:
+        """The record of a point that continuation came to. ends: the outcome if it is the last."""
         spectrum = self._spectrum(point)
-        self._last = spectrum
-        ends = Outcome.REACHED_STOP.value if point.label == "end" else ""
+        self._last = _counting(spectrum, self._beyond)
+        self._beyond = None
         missed, self._missed = tuple(self._missed), []
         label = self._label(point.label) if point.label else ""
         count = None if spectrum is None else spectrum.n_unstable
         around = {"n_unstable_before": count, "n_unstable_after": count} if label else {}
-        return self._record(point, spectrum, label=label, kind=point.label, ends=ends, missed=missed, **around)
+        return self._record(point, spectrum, label=label, kind=point.label, ends=ends or "", missed=missed, **around)
 
     def end(self, inside: Point, outside: Point, outcome: Outcome) -> BranchPoint:
         """The record of where a leg ends for another reason than its stop."""
@@ -100,13 +120,30 @@ class Surveyor:
             found += self._hopf(before, after, self._last, spectrum)
             self._explain(before, after, spectrum, found)
         placed = sorted(((_arclength(one, before, after), one) for one in found), key=lambda pair: pair[0])
-        placed = [(place, one) for place, one in placed if place <= until and not _is_start(one, before)][
-            self._stored :
+        placed = [(place, one) for place, one in placed if place <= until and not _is_start(one, before)]
+        counts = self._counts(before, after, placed, spectrum)
+        records = [
+            self._special(place, one, counts[i : i + 2]) for i, (place, one) in enumerate(placed) if i >= self._stored
         ]
         self._stored = 0
-        ends = [None if one is None else one.n_unstable for one in (self._last, spectrum)]
-        counts = [ends[0], *[None] * (len(placed) - 1), ends[1]] if placed else []
-        return [self._special(place, one, counts[i : i + 2]) for i, (place, one) in enumerate(placed)]
+        return records
+
+    def _counts(
+        self, before: Point, after: Point, placed: Sequence[tuple[float, Located | Hopf]], spectrum: Spectrum | None
+    ) -> list[int | None]:
+        """Numbers of growing modes before, between and after special points at these arclengths."""
+        if spectrum is None or self._last is None:
+            return [None] * (len(placed) + 1)
+        counts = [self._last.n_unstable]
+        for (one, _), (other, _) in pairwise(placed):
+            share = (0.5 * (one + other) - before.arclength) / (after.arclength - before.arclength)
+            middle = point_between(before, after, share)
+            counts.append(None if middle is None else self._solve(middle, spectrum).n_unstable)
+        if placed and _meets(placed[-1][1], after):
+            # The rate that vanishes there is counted neither way: look a little beyond.
+            beyond = replace(after, x=after.x + AWAY * after.tangent[:-1], p=after.p + AWAY * after.tangent[-1])
+            self._beyond = self._solve(beyond, spectrum).n_unstable
+        return [*counts, spectrum.n_unstable if self._beyond is None else self._beyond]
 
     def _special(self, place: float, one: Located | Hopf, counts: list[int | None]) -> BranchPoint:
         if self._leg:
@@ -189,7 +226,7 @@ class Surveyor:
             return None
         unit = self.course.scenario_at(self.scenario, point.value).scales.factor("time")
         rates = point.growth_rates @ np.array([1.0, 1.0j]) * unit
-        outcome = Outcome.EIGENVALUES_UNCONVERGED if point.n_unstable is None else Outcome.CONVERGED
+        outcome = Outcome(point.spectrum)
         return Spectrum(
             outcome=outcome,
             rates=rates,
@@ -220,6 +257,7 @@ class Surveyor:
                 "parities": tuple(rates.parities),
                 "neutral": rates.neutral,
                 "n_unstable": rates.n_unstable,
+                "spectrum": spectrum.outcome.value,
             }
             if more["label"]:
                 known["modes"] = spectrum.modes[:, : len(surface)]
@@ -235,6 +273,20 @@ class Surveyor:
             **known,
             **more,
         )
+
+
+def _counting(spectrum: Spectrum | None, beyond: int | None) -> Spectrum | None:
+    """A spectrum with the number of growing modes that there are beyond a branch point."""
+    return spectrum if spectrum is None or beyond is None else replace(spectrum, n_unstable=beyond)
+
+
+def _meets(one: Located | Hopf, point: Point) -> bool:
+    """Whether a special point is one of the branch's own points, as where it stops or ends at a branch point."""
+    return isinstance(one, Located) and _is_at(one.point.parameter, point.parameter)
+
+
+def _is_at(one: float, other: float) -> bool:
+    return abs(one - other) <= AT_POINT * max(abs(other), 1.0)
 
 
 def _growing_reals(spectrum: Spectrum) -> int:

@@ -10,14 +10,13 @@ from shapespace.base.arrays import Array
 from shapespace.base.errors import InputError
 from shapespace.base.problem import AbstractContinuableProblem
 from shapespace.numerics.collocation import CollocationProblem
-from shapespace.numerics.state import State
 from shapespace.study.engine import Engine
+from shapespace.study.gradients import gradients, reported
 from shapespace.study.keyed import HeldProblem, KeyedProblem
+from shapespace.study.keys import nearest
 from shapespace.study.observables import largest_value, neck
+from shapespace.study.rows import Linear, slope_at, value_at
 from shapespace.study.scenario import Scenario
-
-Linear = tuple[float, Array]
-"""A value and its gradient (n,) by x."""
 
 
 @dataclass(frozen=True)
@@ -29,56 +28,53 @@ class Observable(AbstractMeasure):
 
     def value(self, problem: AbstractContinuableProblem, x: Array, p: Array) -> float:
         assert isinstance(problem, KeyedProblem | HeldProblem)
-        return self.unit * OBSERVED[self.name](problem.base, problem.surface(x))[0]
+        keyed, state, q = _keyed(problem, x, p)
+        if self.name in READ:
+            return self.unit * READ[self.name](keyed.base, state)[0]
+        return self.unit * reported(keyed.base, state, keyed.powers.value(q)).get(self.name, float("nan"))
 
     def gradient(self, problem: AbstractContinuableProblem, x: Array, p: Array) -> tuple[Array, Array]:
         assert isinstance(problem, KeyedProblem | HeldProblem)
-        row = self.unit * OBSERVED[self.name](problem.base, problem.surface(x))[1]
-        return np.append(row, np.zeros(len(x) - len(row))), np.zeros_like(p)
+        keyed, state, q = _keyed(problem, x, p)
+        by_q = np.zeros_like(q)
+        if self.name in READ:
+            row = self.unit * READ[self.name](keyed.base, state)[1]
+        else:
+            found = gradients(keyed.base, state, keyed.powers.value(q), (self.name,))
+            row = self.unit * found.by_x[0]
+            slopes = [keyed.powers.slope(q, unit) for unit in np.eye(len(q))]
+            by_q = self.unit * np.array([found.by_p[0] @ slope for slope in slopes])
+        if isinstance(problem, KeyedProblem):
+            return row, by_q
+        # The key that answers is the last unknown, and the parameter in its place is what is held.
+        answer = by_q[problem.index]
+        by_q[problem.index] = 0.0
+        return np.append(row, answer), by_q
+
+
+def _keyed(problem: KeyedProblem | HeldProblem, x: Array, p: Array) -> tuple[KeyedProblem, Array, Array]:
+    """The problem in keys, its state and the values of the keys."""
+    return (problem, x, p) if isinstance(problem, KeyedProblem) else (problem.inner, *problem.split(x, p))
 
 
 def make_observable(scenario: Scenario, name: str, key: str) -> Observable:
     """The measure of an observable while a key varies. InputError where it cannot be held, or the key changes its unit."""
-    system = Engine.of(scenario).system
-    names = [known for known in OBSERVED if NEEDS.get(known, "h") in (*system.fields, *system.scalars)]
+    names = observed_names(scenario)
     if name not in names:
-        raise InputError(
-            f"{name}: is neither a parameter nor an observable to hold; of these choose {', '.join(names)}."
-        )
+        what = "is a parameter, and stays as it is" if name in scenario.values() else "is no observable"
+        raise InputError(f"{name}: {what}; the nearest observable is {nearest(name, names)}.")
     unit = scenario.scales.factor(name)
     value = float(scenario.values()[key])
-    if scenario.with_overrides({key: 2.0 * value if value else 1.0}).scales.factor(name) != unit:
+    if scenario.with_overrides({key: 0.5 * value if value else 0.5}).scales.factor(name) != unit:
         raise InputError(f"{key}: changes the unit of {name}; choose another key to vary or free.")
     return Observable(name, unit)
 
 
-def blank_row(base: CollocationProblem) -> State:
-    """A gradient to fill in: zero, laid out as a state."""
-    return base.unpack(
-        np.zeros((base.elements + 1) * base.n + base.elements * base.degree * base.n_rows + len(base.system.scalars))
-    )
-
-
-def value_at(base: CollocationProblem, x: Array, field: str, u: float) -> Linear:
-    """A differential field at u."""
-    state, gradient, column = base.unpack(x), blank_row(base), base.system.fields.index(field)
-    if u == 1.0:
-        gradient.nodes[-1, column] = 1.0
-        return float(state.nodes[-1, column]), base.pack(gradient)
-    element, share = state.place(u)
-    gradient.nodes[element, column] = 1.0
-    gradient.slopes[element, :, column] = state.widths[element] * state.rule.basis_integral(np.array([share]))[0]
-    row = base.pack(gradient)
-    return float(row @ x), row
-
-
-def slope_at(base: CollocationProblem, x: Array, field: str, u: float) -> Linear:
-    """The derivative of a differential field at u."""
-    state, gradient = base.unpack(x), blank_row(base)
-    element, share = state.place(u)
-    gradient.slopes[element, :, base.system.fields.index(field)] = state.rule.basis(np.array([share]))[0]
-    row = base.pack(gradient)
-    return float(row @ x), row
+def observed_names(scenario: Scenario) -> tuple[str, ...]:
+    """Observables of the scenario's states that have derivatives."""
+    engine = Engine.of(scenario)
+    known = reported(engine.problem, engine.problem.pack(engine.initial_state()), engine.p)
+    return tuple(dict.fromkeys((*known, "neck_radius")))
 
 
 def _scalar(name: str) -> Callable[[CollocationProblem, Array], Linear]:
@@ -113,7 +109,7 @@ def _polarity(base: CollocationProblem, x: Array) -> Linear:
     return 1.0 - first / last, (first / last * other - one) / last
 
 
-OBSERVED: dict[str, Callable[[CollocationProblem, Array], Linear]] = {
+READ: dict[str, Callable[[CollocationProblem, Array], Linear]] = {
     "height": _height,
     "neck_radius": _neck,
     "equator_radius": lambda base, x: value_at(base, x, "r", 0.5),
@@ -123,5 +119,4 @@ OBSERVED: dict[str, Callable[[CollocationProblem, Array], Linear]] = {
     "polarity": _polarity,
     "max_concentration": _largest_concentration,
 }
-NEEDS = {"pressure": "p", "velocity": "v0", "polarity": "c", "max_concentration": "c"}
-"""The field or scalar that a surface must have for an observable."""
+"""Those that are read off a state at a few places, which costs less than the integrals of `gradients`."""

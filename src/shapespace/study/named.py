@@ -14,7 +14,7 @@ from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.engine import Engine
 from shapespace.study.keyed import KeyedProblem
-from shapespace.study.paths import MAX_POINTS, NEWTON, StateName, along, steps
+from shapespace.study.paths import MAX_POINTS, NEWTON, StateName, along, given_up, steps
 from shapespace.study.scenario import Scenario
 from shapespace.study.settling import key_values, settle
 from shapespace.study.vesicles import solve_vesicle
@@ -45,10 +45,13 @@ def named_state(scenario: Scenario, name: StateName) -> Named:
     resting = settle(simple, Engine.of(simple).initial_state())
     if name is StateName.DEFAULT:
         return _raised(scenario, simple, resting, raised), ""
-    if not missing:
+    if not missing or not resting.outcome.is_success:
         return resting, ""
+    assert isinstance(resting.problem, KeyedProblem)
+    problem = replace(KeyedProblem.of(scenario, (missing[0],)), base=resting.problem.base)
+    here = replace(resting, problem=problem, p=key_values(scenario, (missing[0],)))
     detail = f"The sphere or flat disc rests only with {' = '.join([*missing, '0'])}."
-    return replace(resting, outcome=Outcome.NO_STATE), detail
+    return given_up(here, Outcome.NO_STATE), detail
 
 
 def reference(scenario: Scenario) -> Scenario:

@@ -64,7 +64,7 @@ def along(first: Point, value: float, options: Arclength, away: float | None = N
     return given_up(last, Outcome.NO_STATE if branch.outcome is Outcome.REACHED_STOP else Outcome.NOT_REACHED)
 
 
-def given_up(last: Point, outcome: Outcome) -> Stationary:
+def given_up(last: Point | Stationary, outcome: Outcome) -> Stationary:
     """The record of a way that ended at a point without the state that was looked for."""
     residual = float(np.abs(last.problem.residual(last.x, last.p, REST)).max())
     return Stationary(last.problem, last.x, last.p, outcome, np.nan, residual, 0, False)

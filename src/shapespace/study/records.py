@@ -28,7 +28,7 @@ from shapespace.study.files import acquire_lock, storage, sync_directory, write_
 from shapespace.study.frame import DAMAGE
 from shapespace.study.scenario import Scenario
 
-FORMAT_VERSION = 2
+FORMAT_VERSION = 3
 """To be raised with every change of what is stored, of records too: others are not read."""
 
 CONVENTIONS = (
@@ -63,6 +63,7 @@ class AbstractRecordStore(ABC, Generic[R]):
         self._manifest = manifest
         self._count = count
         self._lock = lock
+        self._made: list[Path] = []  # directories that came with the store
         self._unwritten: dict[str, Any] | None = None  # the manifest of a resumed store, due with its next record
 
     @staticmethod
@@ -98,7 +99,9 @@ class AbstractRecordStore(ABC, Generic[R]):
         except BaseException:
             cls._undo(path, made, lock)
             raise
-        return cls(path, manifest, 0, lock)
+        store = cls(path, manifest, 0, lock)
+        store._made = made
+        return store
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
@@ -158,6 +161,13 @@ class AbstractRecordStore(ABC, Generic[R]):
             sync_directory(self.path / self.folder)
             _write_json(self.path / _MANIFEST, manifest)
         self._manifest, self._unwritten = manifest, None
+
+    def discard(self) -> None:
+        """Take back a store that was made to be written and holds no record, as if it had never been begun."""
+        if self._lock is not None and not self._count:
+            (self.path / _MANIFEST).unlink()
+            self._undo(self.path, self._made, self._lock)
+            self._lock = None
 
     def read(self, index: int) -> R:
         """Record by number, negative from the end. StoreError names the file where it is damaged."""

@@ -16,7 +16,7 @@ from shapespace.base.problem import REST
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.keyed import KeyedProblem
-from shapespace.study.keys import MAIN_KEYS
+from shapespace.study.keys import MAIN_KEYS, MODELS
 from shapespace.study.paths import NEWTON
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import Start
@@ -61,14 +61,16 @@ def settle_near(scenario: Scenario, start: Start) -> Stationary:
 
 
 def _differing(scenario: Scenario, other: Scenario) -> tuple[str, ...]:
-    """Parameters of the scenario that have other values there."""
+    """Parameters that have other values there, by the keys that the scenario gives them as."""
     mine, theirs = scenario.parameters.model_dump(), other.parameters.model_dump()
-    return tuple(key for key, value in mine.items() if theirs[key] != value)
+    twins = MODELS[scenario.model].twins
+    given = {twins[key].sets: key for key, _ in scenario.given if key in twins}
+    return tuple(given.get(key, key) for key, value in mine.items() if theirs[key] != value)
 
 
 def _regular(scenario: Scenario, start: Start) -> Iterator[tuple[Scenario, State]]:
     """The stored state with its scenario; where it is singular, states on either side of it on its branch with theirs."""
-    theirs = start.scenario.parameters.model_dump()
+    theirs = start.scenario.values()
     origin = scenario.with_overrides({key: theirs[key] for key in _differing(scenario, start.scenario)})
     place = _singular_point(origin, start)
     if place is None:

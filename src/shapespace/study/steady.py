@@ -130,9 +130,7 @@ class Steady(Presented):
     def nearest(self) -> str:
         """Where a search ended, in words."""
         reached = ", ".join(f"{key} = {value:.8g}" for key, value in self.reached.items())
-        if self.outcome is Outcome.NO_STATE and self.detail:
-            return self.detail
-        return " ".join(filter(None, [f"Best residual {self.found.residual:.2g} at {reached}.", self.detail]))
+        return " ".join(filter(None, [f"best residual {self.found.residual:.2g} at {reached}.", self.detail]))
 
     @property
     def frame(self) -> Frame:
