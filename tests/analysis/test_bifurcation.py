@@ -1,7 +1,9 @@
 """Folds and branch points of classic problems, and the Jacobian of the systems that define them."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from tests.algebraic import AlgebraicProblem
 
 from shapespace.analysis.bifurcation import (
     Kind,
@@ -10,7 +12,11 @@ from shapespace.analysis.bifurcation import (
     locate_branch_point,
     locate_fold,
 )
+from shapespace.analysis.branch import Point
+from shapespace.analysis.continuation import Continuation, Stop, start_point
+from shapespace.analysis.extended import Parameter
 from shapespace.analysis.singular import SingularProblem
+from shapespace.analysis.tracing import Located, side_branches, traced
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import REST
@@ -75,6 +81,21 @@ def test_pitchforks_of_chafee_and_infante(n: int, start: float):
     sine = np.sin(n * np.pi * u)
     amplitude = (mode @ sine) / (sine @ sine)
     np.testing.assert_allclose(mode, amplitude * sine, atol=1e-6 * abs(amplitude))
+
+
+def test_branches_that_a_symmetry_exchanges():
+    """x_0 x_1 = 0 on lambda = x_0^2 + x_1^2: both turn where they cross, which has no other name; it is one point, not two."""
+    problem = AlgebraicProblem(lambda x, p: jnp.stack([x[0] * x[1], p[0] - x[0] ** 2 - x[1] ** 2]), 2)
+    first = start_point(problem, np.array([1.0, 0.0]), np.ones(1), 0, -1.0)
+    assert isinstance(first, Point)
+    (found,) = (one for one in traced(Continuation([first], [Stop(Parameter(0), 0.5)])) if isinstance(one, Located))
+    point = found.point
+    assert point.kind is Kind.BRANCH_POINT
+    np.testing.assert_allclose([*point.x, point.parameter], 0.0, atol=1e-9)
+    for side in side_branches(point, first.tangent, 0.1):
+        branch = Continuation([side], [Stop(Parameter(0), 0.25, ends=True)])
+        *_, end = branch
+        np.testing.assert_allclose(np.abs(end.x), [0.0, 0.5], atol=1e-8)
 
 
 @pytest.mark.parametrize("is_fold", [True, False])

@@ -1,8 +1,11 @@
 """Pitchforks of resting states in closed form: the polarizing sphere and the buckling disc (exact results 2 and 6)."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import shapespace as ss
 from shapespace.analysis.bifurcation import Kind, SingularPoint, locate_branch_point
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -47,6 +50,42 @@ def test_the_sphere_polarizes_at_its_peclet_number(saturation: float, turnover: 
     error = abs(point.parameter - exact) / exact
     assert error < 1e-9, f"relative error {error:.1e}"
     assert abs(point.parameter - exact) <= point.parameter_error
+
+
+@pytest.fixture(scope="module")
+def oblong(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The sphere through its first two instabilities: l = 1 at Pe = 22, l = 2 at 55."""
+    path = tmp_path_factory.mktemp("oblong") / "sphere"
+    case = scenario("polar-swimmer", elements=20)
+    ss.branch(case, "peclet", 56.5, start=54.0, state="trivial", out=path)
+    return path
+
+
+def test_the_sphere_elongates_at_a_transcritical_point(oblong: Path):
+    """l = 2, whose two signs differ: c0 z g = (1 + g) q (exact result 3 at rate zero), so Pe = 2 (6 + k)(1 + 1/g)."""
+    values = scenario("polar-swimmer").values()
+    g = 6.0 / (4.0 * values["shear_viscosity"] + values["friction"])
+    exact = 2.0 * (6.0 + values["turnover_rate"]) * (1.0 + 1.0 / g)
+    point = ss.open_branch(oblong)["transcritical-1"]
+    assert abs(point.parameter - exact) <= point.parameter_error < 1e-7
+    assert abs(point.parameter - exact) < 1e-8
+    assert (point.n_unstable_before, point.n_unstable_after) == (1, 2)
+
+
+def test_both_sides_of_a_transcritical_point(oblong: Path):
+    """The other branch, at rest: flatter shapes beyond the point, longer ones before it, which then fold."""
+    case = scenario("polar-swimmer", elements=20)
+    flat, long = (
+        ss.branch(case, "peclet", 55.5, origin=f"{oblong}:transcritical-1", side=side, stability=False)
+        for side in (1, -1)
+    )
+    assert [point.label for point in flat.special_points] == ["end-1"]
+    assert {point.kind for point in long.special_points} == {"fold", "end"}
+    assert long["fold-1"].parameter < 55.0
+    for branch, sign in ((flat, -1.0), (long, 1.0)):
+        heights = [sign * (point.observables["height"] - 2.0) for point in branch.points[1:]]
+        assert min(heights) > 0.0
+        assert max(abs(point.observables["velocity"]) for point in branch.points) < 1e-7
 
 
 def test_the_clamped_disc_buckles_at_its_tension():

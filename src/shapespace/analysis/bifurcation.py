@@ -21,7 +21,8 @@ SAFETY = 8.0
 """Of the parameter's error, over its change on a finer mesh, which falls short of it where convergence is slow, or where the
 errors of single elements cancel in it: by a factor of 5 at the fold of a pulled membrane (Fig. 3c of the paper)."""
 TILT = 1e-6
-"""A branch whose unit tangent has a smaller parameter component than this leaves a pitchfork."""
+"""A branch whose unit tangent has a smaller parameter component than this turns there: one does at a pitchfork, none at a
+transcritical point, and both where a symmetry exchanges them, a branch point without another name."""
 
 
 class Kind(StrEnum):
@@ -89,7 +90,7 @@ def locate_branch_point(
         return Outcome.DIVERGED
     at, error = final.parameters(root.x, p), parameter_error(final, root.x, p)
     tilts = np.abs(directions[:, -1]) / max(abs(at[index]), 1.0)
-    kind = Kind.PITCHFORK if tilts.min() < TILT else Kind.TRANSCRITICAL
+    kind = (Kind.TRANSCRITICAL, Kind.PITCHFORK, Kind.BRANCH_POINT)[np.count_nonzero(tilts < TILT)]
     return SingularPoint(kind, problem, index, final.state(root.x), at, error, final.kernel, directions)
 
 

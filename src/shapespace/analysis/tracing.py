@@ -55,7 +55,7 @@ def singular_points(before: Point, after: Point) -> list[Located | Missed]:
 
 def _turns(point: SingularPoint) -> bool:
     """Whether the parameter turns on one of the branches through a point."""
-    return point.kind is Kind.PITCHFORK
+    return point.kind in (Kind.PITCHFORK, Kind.BRANCH_POINT)
 
 
 def _located(bracket: Bracket) -> Located | Missed:
