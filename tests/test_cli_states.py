@@ -26,7 +26,7 @@ def test_steady_prints_a_state_with_its_growth_rates(shell: Shell):
     again = json.loads(shell(*command[:2], *command[4:], "--from", "sphere", "--json").out)
     assert again["growth_rates"][0] == pytest.approx([4.0, 0.0], abs=1e-6)
     text = shell(*command).out
-    assert "unstable: 1 growing modes" in text
+    assert "unstable: 1 growing mode; `shapespace search`" in text
     assert "antisymmetric" in text
 
 

@@ -24,7 +24,7 @@ def test_every_command_has_a_page_that_there_is():
     [
         ("run nothing", "quickstart.md"),
         ("run guided-division -s pecklet=3", "glossary.md"),
-        ("branch guided-division --vary nothing --stop 3", "tutorials/division.md"),
+        ("branch guided-division --vary nothing --stop 3", "how-to/follow-branches.md"),
         ("diagram polar-swimmer -x a -y b", "how-to/map-shape-space.md"),
         ("export nowhere a.csv", "file-format.md"),
         ("explore nowhere", "how-to/explore-in-the-browser.md"),

@@ -1,6 +1,7 @@
 """Special points of curves in closed form, on algebraic problems of one to three unknowns."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -68,6 +69,16 @@ def test_a_cusp():
     for point in points:
         a, b = parameters_at(point)
         assert 27.0 * a**2 == pytest.approx(4.0 * b**3, abs=1e-6)
+
+
+@pytest.mark.parametrize("miss", [0.0, 1e-9, -1e-9])
+def test_a_curve_that_starts_at_a_cusp_does_not_look_for_it_again(miss: float):
+    law = lambda x, p: jnp.stack([p[0] + p[1] * x[0] - x[0] ** 3])
+    start = replace(fold(law, [0.9], [-1.9, 3.0], [1.0]), x=np.array([miss]), p=np.zeros(2))
+    for direction in (1.0, -1.0):
+        specials, points = follow(start, direction, 3.0)
+        assert not specials
+        assert abs(own_parameter(points[-1])) == pytest.approx(2.0, abs=1e-9)
 
 
 def test_bogdanov_and_takens():

@@ -106,6 +106,13 @@ def test_a_state_at_other_parameters_starts_from_a_branch_point(sphere: Path):
         assert abs(found.observables["velocity"]) < 1e-8
 
 
+def test_a_swimmer_that_merges_with_the_sphere_is_no_swimmer_any_more():
+    swims = ss.steady(swimmer(peclet=24.0))
+    found = ss.steady(swimmer(peclet=15.0), start=swims)
+    assert found.outcome is Outcome.NOT_REACHED
+    assert "merged with a symmetric state" in found.nearest
+
+
 def test_a_branch_that_turns_back_says_so():
     """The swimmer ends at the sphere, beyond which it is its own mirror image."""
     found = ss.branch(swimmer(), "peclet", 15.0, start=25.0, stability=False)

@@ -33,6 +33,8 @@ BESIDE = 1e-5
 """Shares of the way by which to step aside from a point where the system is singular."""
 ASIDE = 0.02
 """The same for places that tell where it is."""
+AT_START = 1e-4
+"""A function that is so much smaller at the start of a curve than at the next point vanishes at the start."""
 TOGETHER = 1e-3
 """Special points nearer to each other, relative to the step, are one."""
 STENCIL = 3e-3
@@ -239,7 +241,13 @@ def traced_curve(curve: Continuation) -> Iterator[Point | Special | NotFound]:
 def special_points(one: Readings, other: Readings) -> list[Special | NotFound]:
     """What lies between two neighbours of a curve with these readings, in its order."""
     before, after = one.point, other.point
-    kinds = [kind for kind, value in one.values.items() if value * other.values[kind] < 0.0]
+    # A curve that starts at a special point need not find it again.
+    least = AT_START if before.arclength == 0.0 else 0.0
+    kinds = [
+        kind
+        for kind, value in one.values.items()
+        if value * other.values[kind] < 0.0 and abs(value) > least * abs(other.values[kind])
+    ]
     if test_on(before, after.problem) * after.test < 0.0:
         system = system_of(after)
         mirrored = system.is_fold and is_symmetric(system.base, system.state(after.x))

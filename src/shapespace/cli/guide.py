@@ -5,7 +5,7 @@ from pathlib import Path
 
 from shapespace.base.errors import StoreError
 
-FIRST = "quickstart.md"
+FIRST, BRANCHES = "quickstart.md", "how-to/follow-branches.md"
 PAGES = {
     "scenarios": FIRST,
     "config": FIRST,
@@ -13,8 +13,8 @@ PAGES = {
     "steady": FIRST,
     "plot": FIRST,
     "movie": "how-to/make-movies.md",
-    "branch": "tutorials/division.md",
-    "curve": "tutorials/division.md",
+    "branch": BRANCHES,
+    "curve": BRANCHES,
     "search": "how-to/find-all-states.md",
     "diagram": "how-to/map-shape-space.md",
     "export": "how-to/export.md",

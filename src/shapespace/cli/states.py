@@ -139,4 +139,7 @@ def _summarise(found: "Steady", rates: "Rates | None", slopes: dict[str, dict[st
 def _verdict(rates: "Rates") -> str:
     if rates.n_unstable is None:
         return "stability unknown"
-    return "stable" if rates.n_unstable == 0 else f"unstable: {rates.n_unstable} growing modes"
+    if rates.n_unstable == 0:
+        return "stable"
+    modes = "1 growing mode" if rates.n_unstable == 1 else f"{rates.n_unstable} growing modes"
+    return f"unstable: {modes}; `shapespace search` looks for other states"

@@ -9,6 +9,7 @@ import numpy as np
 from shapespace.analysis.bifurcation import Kind, solve_singular
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, start_point
+from shapespace.analysis.passage import is_symmetric
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
@@ -41,21 +42,30 @@ def settle(scenario: Scenario, state: State, keys: tuple[str, ...] = ()) -> Stat
     return solve_stationary(replace(problem, base=base), x, key_values(scenario, keys), NEWTON)
 
 
-def settle_near(scenario: Scenario, start: Start) -> Stationary:
+def settle_near(scenario: Scenario, start: Start) -> tuple[Stationary, str]:
     """What a stored state becomes at the scenario's parameters: settled at its own ones first, then by stepping.
 
-    A fold or branch point is left along its branch first, one way and then the other.
+    A fold or branch point is left along its branch first, one way and then the other. A state that merges on the way with one
+    that is its own mirror image is not there any more. With the reason in words, where there is one.
     """
     if not _differing(scenario, start.scenario):
-        return _singular_at(scenario, start) or settle(scenario, state_of(start.frame))
+        return _singular_at(scenario, start) or settle(scenario, state_of(start.frame)), ""
     first = None
     for origin, state in _regular(scenario, start):
         keys = _differing(scenario, origin)
-        found = settle(origin, state, keys)
-        found = step_to(found, key_values(scenario, keys))
+        settled = settle(origin, state, keys)
+        found, told = step_to(settled, key_values(scenario, keys)), ""
         if found.outcome.is_success:
-            return solve_stationary(found.problem, found.x, found.p, NEWTON)
-        first = first or found
+            found = solve_stationary(found.problem, found.x, found.p, NEWTON)
+        if (
+            found.outcome.is_success
+            and is_symmetric(found.problem, found.x)
+            and not is_symmetric(settled.problem, settled.x)
+        ):
+            found, told = replace(found, outcome=Outcome.NOT_REACHED), "On the way it merged with a symmetric state."
+        if found.outcome.is_success:
+            return found, ""
+        first = first or (found, told)
     assert first is not None
     return first
 

@@ -195,7 +195,7 @@ def steady(
 def steady_near(scenario: Scenario, start: Start) -> Steady:
     """What a stored state becomes at the scenario's parameters; InputError where it is one of another model."""
     start.check_fits(scenario)
-    return steady_of(scenario, settle_near(scenario, start))
+    return steady_of(scenario, *settle_near(scenario, start))
 
 
 def follow(start: Steady, key: str, value: float) -> Steady:
