@@ -20,7 +20,7 @@ FORCE = 2.0 * np.pi
 class Way:
     """To a fold: the first one after a state of a branch that starts at rest, or of another one that leaves it in another key.
 
-    at: value of the branch's key at which the state lies; number: which of the states there.
+    at: value of the branch's key at which the state lies; number: which of the states there, 0 the one at rest. keys: others.
     """
 
     scenario: str
@@ -29,6 +29,12 @@ class Way:
     number: int
     vary: str
     towards: float
+    keys: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Of the branch that the state lies on."""
+        return "-".join([self.scenario, *(f"{value:g}" for _, value in self.keys)])
 
 
 WAYS = {
@@ -39,6 +45,14 @@ WAYS = {
     "3c, without neck": Way("membrane-protrusion", "spontaneous_curvature", 9.0, 1, "pulling_force", 2.0 * FORCE),
     "3c, tether": Way("membrane-protrusion", "spontaneous_curvature", 9.0, 3, "pulling_force", 6.0 * FORCE),
     "3c, pushed": Way("membrane-protrusion", "spontaneous_curvature", 9.0, 3, "pulling_force", -2.0 * FORCE),
+    "3c, without coat": Way("membrane-protrusion", "spontaneous_curvature", 0.0, 0, "pulling_force", 6.0 * FORCE),
+    **{
+        f"7b, {shape} at Pe = {peclet:g}": Way(
+            "guided-division", "ring_amplitude", at, number, "ring_amplitude", end, (("peclet", peclet),)
+        )
+        for peclet, at in ((300.0, 2.5), (150.0, 4.5))
+        for shape, number, end in (("ellipsoid", 1, 8.0), ("dumbbell", 3, 1.0))
+    },
 }
 
 
@@ -50,7 +64,7 @@ class Found(Exception):
 def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Branches through the states to start from."""
     out = tmp_path_factory.mktemp("paper")
-    for name, key, at in sorted({(way.scenario, way.key, way.at) for way in WAYS.values()}):
+    for way in {way.name: way for way in WAYS.values() if way.number}.values():
         seen = 0
 
         def look(point: BranchPoint, _count: int) -> None:
@@ -61,9 +75,17 @@ def stores(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
         with pytest.raises(Found):
             ss.branch(
-                ss.scenario(name), key, 14.0, start=0.0, at=(at,), state="trivial", stability=False, out=out / name, progress=look
-            )  # fmt: skip
-    return {name: out / name for name in {way.scenario for way in WAYS.values()}}
+                ss.scenario(way.scenario, **dict(way.keys)),
+                way.key,
+                14.0,
+                start=0.0,
+                at=(way.at,),
+                state="trivial",
+                stability=False,
+                out=out / way.name,
+                progress=look,
+            )
+    return {way.name: out / way.name for way in WAYS.values()}
 
 
 def fold_of(way: Way, store: Path, numerics: dict[str, Any]) -> BranchPoint:
@@ -75,9 +97,10 @@ def fold_of(way: Way, store: Path, numerics: dict[str, Any]) -> BranchPoint:
             found.append(point)
             raise Found
 
-    case = ss.scenario(way.scenario, **{way.key: way.at}, **numerics)
+    case = ss.scenario(way.scenario, **{way.key: way.at}, **dict(way.keys), **numerics)
+    start = {"origin": f"{store}:user-{way.number}"} if way.number else {"state": "trivial"}
     with pytest.raises(Found):
-        ss.branch(case, way.vary, way.towards, origin=f"{store}:user-{way.number}", stability=False, progress=look)
+        ss.branch(case, way.vary, way.towards, stability=False, progress=look, **start)
     return found[0]
 
 
@@ -86,7 +109,7 @@ def fold_of(way: Way, store: Path, numerics: dict[str, Any]) -> BranchPoint:
 def test_folds_are_converged(name: str, stores: dict[str, Path]):
     """In mesh and degree to 1e-6; and the estimated errors cover the differences."""
     way = WAYS[name]
-    folds = [fold_of(way, stores[way.scenario], numerics) for numerics in (DEFAULT, FINER, OTHER)]
+    folds = [fold_of(way, stores[way.name], numerics) for numerics in (DEFAULT, FINER, OTHER)]
     values, errors = zip(*((fold.parameter, fold.parameter_error) for fold in folds), strict=True)
     told = ", ".join(f"{value:.10f} ({error:.0e})" for value, error in zip(values, errors, strict=True))
     assert abs(values[1] - values[2]) <= 1e-6, told

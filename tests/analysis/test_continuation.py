@@ -119,6 +119,19 @@ def test_bratu_around_its_fold():
     assert sum(point.jacobians for point in points) <= 1.2 * len(points)
 
 
+def test_arclength_does_not_know_the_mesh():
+    """The same stops lie at the same arclength on meshes of other sizes and degrees, but for what chords of the arc leave."""
+    places = []
+    for elements, degree in ((10, 4), (40, 4), (20, 6)):
+        problem = bratu(elements, degree)
+        points, _ = follow(
+            start(problem, [0.2], at_rest(problem), largest=0.02), [Stop(LAMBDA, 3.0), until(1.0)], largest=0.02
+        )
+        places.append([point.arclength for point in points if point.label in ("user", "end")])
+    assert len(places[0]) == 3
+    np.testing.assert_allclose(places[1:], [places[0]] * 2, rtol=2e-4)
+
+
 def test_a_branch_run_twice_or_resumed_has_the_same_points():
     """Bit for bit, whether uninterrupted, run again, or taken up from its last points at any place, stops included."""
     problem, stops = bratu(), [Stop(LAMBDA, 1.0)]
