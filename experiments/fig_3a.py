@@ -40,26 +40,40 @@ def three_states(branch: ss.Branch) -> list[BranchPoint]:
 def run(out: Path, quick: bool) -> list[Row]:
     """Branch, figure, table; in full also the branch on a finer mesh of a higher degree."""
     branch = gibbs_loop(out / "gibbs", stability=not quick)
-    finer = (
-        branch
-        if quick
-        else gibbs_loop(out / "gibbs-finer", stability=False, elements=80, degree=5, mesh_tolerance=1e-6)
-    )
     draw(branch, out)
-    return check(branch, finer, quick)
+    rows = check(branch)
+    if quick:
+        return rows
+    finer = gibbs_loop(out / "gibbs-finer", stability=False, elements=80, degree=5, mesh_tolerance=1e-6)
+    return [*check_convergence(branch, finer), *rows, *check_stability(branch)]
 
 
-def check(branch: ss.Branch, finer: ss.Branch, quick: bool) -> list[Row]:
-    """The loop, its stability and its end."""
+def check_convergence(branch: ss.Branch, finer: ss.Branch) -> list[Row]:
+    """The folds and the end, on two meshes."""
+    (end,), (other,) = (labelled(one, "neck-closed") for one in (branch, finer))
+    pairs = zip(("upper", "lower"), *(labelled(one, "fold") for one in (branch, finer)), strict=True)
+    return [
+        *(
+            near(f"{name} fold, and on a finer mesh", "shown, no number", one.parameter, two.parameter, 1e-6)
+            for name, one, two in pairs
+        ),
+        near("neck closes at C0 =, and on a finer mesh", "budding limit", end.parameter, other.parameter, 1e-5),
+    ]
+
+
+def check(branch: ss.Branch) -> list[Row]:
+    """The loop and its end."""
     folds = labelled(branch, "fold")
     low, middle, high = three_states(branch)
-    (end,), (other,) = (labelled(one, "neck-closed") for one in (branch, finer))
-    rows = [
-        near(f"{name} fold, and on a finer mesh", "shown, no number", one.parameter, two.parameter, 1e-6)
-        for name, one, two in zip(("upper", "lower"), folds, labelled(finer, "fold"), strict=True)
-    ]
-    rows += [
-        near("neck closes at C0 =, and on a finer mesh", "budding limit", end.parameter, other.parameter, 1e-5),
+    (end,) = labelled(branch, "neck-closed")
+    return [
+        Row(
+            "folds, and the end where the neck closes",
+            "two, budding limit",
+            ", ".join(f"{point.parameter:.5f}" for point in (*folds, end)),
+            f"{max(point.parameter_error for point in folds):.0e}",
+            len(folds) == 2 and folds[1].parameter < SHOWN < folds[0].parameter < end.parameter,
+        ),
         Row(
             f"states at C0 = {SHOWN:g}, heights",
             "three",
@@ -75,12 +89,14 @@ def check(branch: ss.Branch, finer: ss.Branch, quick: bool) -> list[Row]:
             "neck_radius" not in low.observables and "neck_radius" in high.observables,
         ),
     ]
-    if quick:
-        return rows
+
+
+def check_stability(branch: ss.Branch) -> list[Row]:
+    """Which parts are stable."""
+    folds = labelled(branch, "fold")
     counts = [count for count in (point.n_unstable for point in branch.points if point.is_step) if count is not None]
     changes = [count for i, count in enumerate(counts) if i == 0 or count != counts[i - 1]]
     return [
-        *rows,
         Row(
             "growing modes along the branch",
             "stable, unstable, stable",
