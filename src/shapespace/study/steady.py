@@ -358,11 +358,21 @@ def check_has_isolated_states(scenario: Scenario) -> None:
         )
 
 
-def modes_near(scenario: Scenario, frame: Frame, count: int = 6) -> Modes:
-    """Leading modes of a stored state at rest, settled anew. InputError where it does not rest at these parameters."""
+def settled(scenario: Scenario, frame: Frame) -> Frame:
+    """The state of rest that a surface has come close to. InputError where there is none."""
     found = steady_from(scenario, state_of(frame))
     if not found.outcome.is_success:
         raise InputError(f"this state does not rest at its parameters ({found.outcome}): {found.outcome.advice}")
+    return found.frame
+
+
+def modes_at(scenario: Scenario, frame: Frame, count: int = 6) -> Modes:
+    """Leading modes of a stored solution, at the state as it is: Newton's method loses a fold or a branch point."""
+    problem = KeyedProblem.of(scenario, (_main_key(scenario),))
+    problem = replace(problem, base=problem.base.on_mesh(frame.mesh))
+    x, p = problem.base.pack(state_of(frame)), key_values(scenario, problem.keys)
+    residual = float(np.abs(problem.residual(x, p, REST)).max())
+    found = _steady(scenario, Stationary(problem, x, p, Outcome.CONVERGED, 0.0, residual, 0, settled=True))
     spectrum = found.spectrum(count)
     if not spectrum.outcome.is_success:
         raise InputError(f"its growth rates are not known ({spectrum.outcome}): {spectrum.outcome.advice}")

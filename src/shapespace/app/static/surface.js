@@ -25,6 +25,8 @@ export class Surface {
     this.orbit = new Orbit(host, () => { this.due(); changed(this.orbit.text()); });
     this.extent = 0;
     this.centre = 0;
+    this.body = new three.Group();
+    this.scene.add(this.body);
     this.makeSkin();
     this.makeArrows();
     this.makeRings();
@@ -35,7 +37,7 @@ export class Surface {
     const material = new three.MeshStandardMaterial({ vertexColors: true, roughness: 0.62, metalness: 0, side: three.DoubleSide });
     this.skin = new three.Mesh(new three.BufferGeometry(), material);
     this.skin.frustumCulled = false;
-    this.scene.add(this.skin);
+    this.body.add(this.skin);
     this.rows = 0;
   }
 
@@ -47,7 +49,7 @@ export class Surface {
     this.swim = [head, shaft].map((shape) => new three.Mesh(shape, new three.MeshStandardMaterial({ roughness: 0.5 })));
     for (const part of [...this.arrowParts, ...this.swim]) {
       part.frustumCulled = false;
-      this.scene.add(part);
+      this.body.add(part);
     }
   }
 
@@ -60,7 +62,7 @@ export class Surface {
     this.ring = new three.Line(shape, new three.LineBasicMaterial({ color: 0xc8501e }));
     this.rim = new three.Line(shape, new three.LineBasicMaterial({ color: 0x66707d }));
     this.ring.visible = this.rim.visible = false;
-    this.scene.add(this.ring, this.rim);
+    this.body.add(this.ring, this.rim);
   }
 
   setTheme(isDark) {
@@ -75,10 +77,17 @@ export class Surface {
     this.extent = 0;
   }
 
+  /** Show nothing. */
+  hide() {
+    this.body.visible = false;
+    this.due();
+  }
+
   /** Show a meridian: r, z, angle (m,), with values to colour, their scale, and velocities along and normal to it or null. */
   show({ r, z, angle, values, scale, flow, fastest, speed, isOpen }) {
     const rows = r.length;
     if (rows !== this.rows) this.makeMesh(rows);
+    this.body.visible = true;
     let [low, high, wide] = [Infinity, -Infinity, 0];
     for (let i = 0; i < rows; i++) {
       low = Math.min(low, z[i]);
@@ -177,6 +186,17 @@ export class Surface {
       part.matrixAutoUpdate = false;
       part.matrix.copy(matrix);
     }
+  }
+
+  /** The row of the meridian under the pointer, null beside the surface. */
+  rowAt({ clientX, clientY }) {
+    if (!this.body.visible || this.orbit.isHeld) return null;
+    const { left, top, width, height } = this.host.getBoundingClientRect();
+    const ray = new three.Raycaster();
+    ray.setFromCamera(new three.Vector2((2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height), this.camera);
+    this.skin.geometry.computeBoundingSphere();
+    const [hit] = ray.intersectObject(this.skin);
+    return hit ? Math.floor(hit.faceIndex / (2 * AROUND)) : null;
   }
 
   /** A ring around the surface at a row of the meridian; none for null. */
