@@ -57,7 +57,7 @@ def serve() -> "Iterator[Callable[..., Explorer]]":
 
 
 @pytest.fixture(scope="session")
-def browser() -> "Iterator[Browser]":
+def program() -> "Iterator[Browser]":
     """A browser for all tests."""
     from tests.app.browser import PROGRAM, chromium
 
@@ -66,3 +66,13 @@ def browser() -> "Iterator[Browser]":
         pytest.skip("needs Chromium (Debian: apt install chromium)")
     with chromium() as found:
         yield found
+
+
+@pytest.fixture
+def browser(program: "Browser") -> "Iterator[Browser]":
+    """The same; no test leaves an error on its console."""
+    program.errors.clear()
+    program.requests.clear()
+    program.resize(1280, 800)
+    yield program
+    assert not program.errors

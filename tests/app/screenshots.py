@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tests.app.browser import Browser, chromium
+from tests.app.pages import address, go_to, open_page
 from tests.app.served import serving
 from tests.app.stores import make_more, make_stores
 
@@ -37,11 +38,13 @@ def views(stores: int) -> Iterator[View]:
                 yield View(store, theme, width, height)
 
 
-def show(browser: Browser, explorer: Explorer, view: View, more: str = "") -> None:
-    """Open the page at a view. more: of the address."""
+def show(browser: Browser, explorer: Explorer, view: View) -> None:
+    """Go to a view, in a new page where none is open."""
     browser.resize(view.width, view.height, mobile=view.width < 600)
-    browser.open(f"{explorer.address}#store={view.store}&theme={view.theme}{more}")
-    browser.settle()
+    if browser.run("location.href").startswith(explorer.address):
+        go_to(browser, address(explorer, view.store, theme=view.theme))
+    else:
+        open_page(browser, explorer, view.store, theme=view.theme)
 
 
 def take(browser: Browser, explorer: Explorer, folder: Path) -> None:

@@ -79,13 +79,15 @@ def make_search(path: Path) -> Path:
 
 def make_states(path: Path) -> Path:
     """A map of two states, one of which is not everywhere, with the pitchforks between and folds that are made up."""
-    axes = f"{X}=18:30:6", "turnover_rate=8:12:4"
+    axes = f"{X}=20:36:6", "turnover_rate=8:12:4"
     diagram(swimmer(), *axes, states=("trivial", "default"), stability=True, boundaries=True, workers=1, out=path)
     (forks,) = (path / CURVES).iterdir()
     known = CurveStore.open(forks)
+    aside = np.array([3.0 if key == X else 0.0 for key in known.request["keys"]])
     with CurveStore.create(path / CURVES / "made-up", known.scenario, known.request) as store:
-        for point in known:
-            store.append(replace(point, of="fold", kind="cusp", parameters=point.parameters + (3.0, 0.0)))
+        for number, point in enumerate(known):
+            named = {"label": "cusp-1", "kind": "cusp"} if number == len(known) // 2 else {}
+            store.append(replace(point, of="fold", parameters=point.parameters + aside, **named))
         store.finish(Outcome.REACHED_STOP)
     return path
 

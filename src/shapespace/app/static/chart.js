@@ -41,8 +41,11 @@ export class Chart {
     if (words) this.svg.replaceChildren();
   }
 
-  /** Axes for these limits; sets `x` and `y`, the scales, and returns the layer to draw on. Margins widen for long numbers. */
-  axes({ width, height, x, y, xTitle, yTitle, equal = false, right = 0, left = LEFT, whole = false }) {
+  /**
+   * Axes for these limits; sets `x` and `y`, the scales, and returns the layer to draw on. Margins widen for long numbers.
+   * beyond: pixels above and below the axes in which what lies at their ends is still drawn.
+   */
+  axes({ width, height, x, y, xTitle, yTitle, equal = false, right = 0, left = LEFT, whole = false, beyond = 6 }) {
     this.svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
     const box = { left, right: width - RIGHT - right, top: TOP, bottom: height - BOTTOM };
     let [xs, ys] = equal ? even(x, y, box) : [x, y];
@@ -59,7 +62,7 @@ export class Chart {
     }
     if (yTitle) back.append(title(yTitle.name, yTitle, { x: Math.max(box.left - 38, 6), y: 14 }));
     const clip = make("clipPath", { id: this.clip }, make("rect", {
-      x: box.left - 1, y: box.top - 6, width: Math.max(box.right - box.left + 2, 0), height: Math.max(box.bottom - box.top + 12, 0),
+      x: box.left - 1, y: box.top - beyond, width: Math.max(box.right - box.left + 2, 0), height: Math.max(box.bottom - box.top + 2 * beyond, 0),
     }));
     const layer = make("g", { "clip-path": `url(#${this.clip})` });
     this.overlay = make("g");

@@ -100,7 +100,7 @@ export class Diagram extends Chart {
     labels.forEach((label, i) => {
       if (!label || !Number.isFinite(xs[i]) || !Number.isFinite(ys[i])) return;
       const [px, py] = [this.x(xs[i]), this.y(ys[i])];
-      layer.append(mark(kinds[i], px, py, line ? "" : kindOf(unstable[i])));
+      layer.append(mark(kinds[i], px, py, { label, more: line ? "" : kindOf(unstable[i]) }));
       if (kinds[i] === "end") unnamed.push([px, py]);
       else wanted.push({ text: label, x: px, y: py });
     });
@@ -173,7 +173,7 @@ function unit(name) {
 
 /** Drawings of 26 by 10 pixels for a legend. */
 const lineOf = (kind) => [make("path", { class: kind, d: "M0 5H26" })];
-const dotOf = (kind) => [mark("state", 13, 5, kind)];
+const dotOf = (kind) => [mark("state", 13, 5, { more: kind })];
 
 /** What a drawing means, for a legend. */
 export function sample(drawing, words) {

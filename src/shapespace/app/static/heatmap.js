@@ -104,7 +104,7 @@ export class Heatmap extends Chart {
     const [xs, ys] = [x.values, y.values];
     this.half = [(xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2];
     const layer = this.axes({
-      width, height,
+      width, height, beyond: 1,
       x: [xs[0] - this.half[0], xs.at(-1) + this.half[0]], y: [ys[0] - this.half[1], ys.at(-1) + this.half[1]],
       xTitle: { name: x.key, ...session.quantity(x.key) }, yTitle: { name: y.key, ...session.quantity(y.key) },
     });
@@ -189,7 +189,7 @@ export class Heatmap extends Chart {
       for (const [text, kind, a, b] of labels) wanted.push({ text, kind, x: this.x(isTurned ? b : a), y: this.y(isTurned ? a : b) });
       return { of, points: Array.from(x, (value, k) => [this.x(value), this.y(y[k])]) };
     });
-    for (const { kind, x, y } of wanted) layer.append(mark(kind, x, y));
+    for (const { text, kind, x, y } of wanted) layer.append(mark(kind, x, y, { label: text }));
     placeLabels(wanted, this.lines.map(({ points }) => points), this.box, layer);
     for (const of of new Set(this.lines.map((line) => line.of))) {
       const drawing = ["rim", of].map((kind) => make("path", { class: `boundary ${kind}`, d: "M0 5H26" }));

@@ -8,7 +8,7 @@ const DISTANCES = [NEAR, 20, 34, 50, 70, 95];
 const DIRECTIONS = Array.from({ length: 16 }, (_, k) => [Math.cos((k * Math.PI) / 8), Math.sin((k * Math.PI) / 8)]);
 const PASSES = 6;
 /** How much nearer, in pixels, its own point must be than any other for a label to need no line. */
-const CLEAR = 4;
+const CLEAR = 6;
 /** How far from its point a label may stand without a line. */
 const ALONE = 24;
 const COST = { line: 1, label: 80, mark: 40, outside: 200, tied: 12, crossed: 40, perPixel: 0.15 };
@@ -30,11 +30,10 @@ export function place(wanted, drawn, box, layer, marks = []) {
     });
     if (!isMoved) break;
   }
-  chosen.forEach((spot, k) => {
-    const { text } = wanted[k];
-    if (spot.tie) layer.append(make("path", { class: "tie", "data-label": text, d: `M${spot.tie.map((one) => one.join(" ")).join("L")}` }));
-    layer.append(make("text", { class: "special-label", x: spot.left + 2, y: spot.bottom - 3 }, text));
-  });
+  const path = (points) => `M${points.map((one) => one.join(" ")).join("L")}`;
+  const ties = chosen.map(({ tie }, k) => tie && make("path", { class: "tie", "data-label": wanted[k].text, d: path(tie) }));
+  layer.append(...ties.filter(Boolean));
+  layer.append(...chosen.map(({ left, bottom }, k) => make("text", { class: "special-label", x: left + 2, y: bottom - 3 }, wanted[k].text)));
 }
 
 /** Where a label may stand, each with what it covers there, and the line to its point where another point is as near. */

@@ -13,6 +13,6 @@ const SHAPES = {
 };
 
 /** The mark of a kind of point; ends of other kinds are crosses. */
-export function mark(kind, x, y, more = "") {
-  return make("path", { class: `special ${more}`, d: SHAPES[kind] ?? CROSS, transform: `translate(${x} ${y})` });
+export function mark(kind, x, y, { label = "", more = "" } = {}) {
+  return make("path", { class: `special ${more}`, d: SHAPES[kind] ?? CROSS, transform: `translate(${x} ${y})`, "data-label": label });
 }

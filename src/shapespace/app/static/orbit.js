@@ -76,8 +76,10 @@ export class Orbit {
     camera.lookAt(0, 0, 0);
   }
 
+  /** The view in numbers; empty for that at first. */
   text() {
-    return [this.azimuth, this.elevation, this.zoom].map((one) => one.toFixed(3)).join(",");
+    const [told, first] = [this, START].map((one) => [one.azimuth, one.elevation, one.zoom].map((value) => value.toFixed(3)).join(","));
+    return told === first ? "" : told;
   }
 
   read(text) {

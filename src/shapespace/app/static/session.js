@@ -122,7 +122,7 @@ export const session = new (class extends EventTarget {
   /** Set the surface swinging along a mode. */
   async animate(index) {
     const { state } = this;
-    if (state.rates && !(index < state.rates.values.length)) {
+    if (state.rates ? !(index < state.rates.values.length) : !state.can_compute) {
       view.set({ mode: "" });
       return;
     }

@@ -145,7 +145,7 @@ export class Stage {
 
   wait() {
     const { mode } = session;
-    const stops = matchMedia("(hover: none)").matches ? "tap the growth rate again to stop" : "Esc stops";
+    const stops = matchMedia("(pointer: coarse)").matches ? "tap the growth rate again to stop" : "Esc stops";
     const swinging = mode && session.state?.fields ? `swinging along mode ${mode.index + 1}${wordsOf(session.state, mode)}, drawn large; ${stops}` : "";
     this.note.textContent = session.waiting || swinging;
     this.note.classList.toggle("waiting", session.waiting !== "");
@@ -170,7 +170,7 @@ function scaleWords(span, colour, mode, flow) {
   const units = unit === "1" ? "" : html(unit);
   const name = `${safe(colour)} ${html(symbol)}`;
   const bar = span.all !== null && !mode
-    ? `${name} <span><i class="bar kind" style="background:${colourOf(span.all, span)}"></i><b>${number(span.all, 3)}</b>${units} everywhere</span>`
+    ? `${name} <span><i class="bar kind" style="background:${colourOf(span.all, span)}"></i><b>${number(span.all, 3)}</b> ${units} everywhere</span>`
     : `${name}${units ? ` (${units})` : ""} <span><b>${number(span.low, 3)}</b><i class="bar" style="background:${gradient(span)}"></i>`
       + `<b>${span.isBeyond ? "over " : ""}${number(span.high, 3)}</b></span>`;
   return `<span>${flow}</span><span>${bar}</span>`;

@@ -26,6 +26,7 @@ export class Surface {
     this.extent = 0;
     this.centre = 0;
     this.body = new three.Group();
+    this.body.visible = false;
     this.scene.add(this.body);
     this.makeSkin();
     this.makeArrows();
@@ -221,8 +222,13 @@ export class Surface {
 
   render() {
     const { clientWidth: width, clientHeight: height } = this.host;
-    if (!width || !height || !this.extent) return;
+    if (!width || !height) return;
     this.renderer.setSize(width, height, false);
+    if (this.extent) this.placeCamera(width, height);
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  placeCamera(width, height) {
     this.camera.aspect = width / height;
     const half = (this.camera.fov * Math.PI) / 360;
     const reach = (1.16 * this.extent) / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
@@ -230,7 +236,6 @@ export class Surface {
     this.camera.near = 0.02 * reach;
     this.camera.far = 6 * reach;
     this.camera.updateProjectionMatrix();
-    this.renderer.render(this.scene, this.camera);
   }
 }
 

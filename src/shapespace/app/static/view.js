@@ -10,7 +10,7 @@ const COLOURS = new RegExp(`^(auto|${MAPS.join("|")})$`);
 const KNOWN = {
   store: ["0", COUNT], place: ["", /^[\d,]*$/], x: ["", NAME], y: ["", NAME], of: ["", NAME], state: ["0", COUNT], mapcolours: ["auto", COLOURS],
   colour: ["", NAME], colours: ["auto", COLOURS], arrows: ["1", /^[01]$/], first: ["", NAME], second: ["", NAME],
-  mode: ["", COUNT], camera: ["", /^(-?\d+\.?\d*,){2}\d+\.?\d*$/], theme: ["", /^(light|dark)$/],
+  mode: ["", /^\d$/], camera: ["", /^(-?\d+\.?\d*,){2}\d+\.?\d*$/], theme: ["", /^(light|dark)$/],
 };
 const OF_STORE = ["place", "mode", "x", "y", "of", "state"];
 
