@@ -105,7 +105,7 @@ export class Diagram extends Chart {
       else wanted.push({ text: label, x: px, y: py });
     });
     const drawn = Array.from(xs, (value, i) => [this.x(value), this.y(ys[i])]).filter((one) => one.every(Number.isFinite));
-    placeLabels(wanted, line ? [drawn] : [], this.box, layer, unnamed);
+    placeLabels(wanted, line ? [drawn] : [], this.box, this.overlay, unnamed);
   }
 
   mark() {

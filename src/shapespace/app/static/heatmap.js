@@ -190,7 +190,7 @@ export class Heatmap extends Chart {
       return { of, points: Array.from(x, (value, k) => [this.x(value), this.y(y[k])]) };
     });
     for (const { text, kind, x, y } of wanted) layer.append(mark(kind, x, y, { label: text }));
-    placeLabels(wanted, this.lines.map(({ points }) => points), this.box, layer);
+    placeLabels(wanted, this.lines.map(({ points }) => points), this.box, this.overlay);
     for (const of of new Set(this.lines.map((line) => line.of))) {
       const drawing = ["rim", of].map((kind) => make("path", { class: `boundary ${kind}`, d: "M0 5H26" }));
       this.legend.append(sample(drawing, `${plain(of)}s`));
