@@ -152,9 +152,9 @@ class DiagramSource(AbstractSource):
         i, j = self._strides()
         return (f"{s},{i * x},{j * y}" for s, y, x in np.ndindex(self._whole(OUTCOME)[:, ::j, ::i].shape))
 
-    def _places_with_shape(self) -> set[str]:
+    def _places_with_shape(self) -> list[str]:
         i, j = self._strides()
-        return {f"{s},{i * x},{j * y}" for s, y, x in np.argwhere(self._whole(OUTCOME)[:, ::j, ::i] == IS_STATE)}
+        return [f"{s},{i * x},{j * y}" for s, y, x in np.argwhere(self._whole(OUTCOME)[:, ::j, ::i] == IS_STATE)]
 
     def questions(self) -> Iterator[tuple[str, dict[str, str]]]:
         store = self.store()
@@ -163,7 +163,7 @@ class DiagramSource(AbstractSource):
             raise InputError(f"{self.path}: its {points} points are too many for one file, at most {MOST_POINTS}.")
         for name in self.numbers().names:
             yield "values", {"name": name}
-        has_shape = self._places_with_shape()
+        has_shape = {*self._places_with_shape()}
         for place in self.places():
             yield "state", {"place": place}
             if place not in has_shape:
@@ -176,7 +176,12 @@ class DiagramSource(AbstractSource):
             yield "shape", {"place": place}
 
     def warm(self) -> None:
-        self.shape(next(iter(self._places_with_shape())))
+        """And all numbers, as those of one point are some tens of small files."""
+        for place in self._places_with_shape()[:1]:
+            self.shape(place)
+        if self.store().outcome is not None:
+            for name in self.numbers().names:
+                self._whole(name)
 
     def _strides(self) -> tuple[int, int]:
         """Every how many points along x and y a file has a shape."""

@@ -20,7 +20,12 @@ export class Chart {
     host.append(this.message);
     this.isDue = false;
     this.clip = `clip-${++charts}`;
-    new ResizeObserver(() => this.due()).observe(host);
+    // Its size is told, as to ask for it while other drawings change costs a layout each time.
+    this.size = { width: 0, height: 0 };
+    new ResizeObserver(([{ contentRect: { width, height } }]) => {
+      this.size = { width: Math.floor(width), height: Math.floor(height) };
+      this.due();
+    }).observe(host);
   }
 
   /** Draw again, once for all that changed. */
@@ -29,8 +34,8 @@ export class Chart {
     this.isDue = true;
     requestAnimationFrame(() => {
       this.isDue = false;
-      const { clientWidth, clientHeight } = this.host;
-      if (clientWidth > 20 && clientHeight > 20) this.draw(clientWidth, clientHeight);
+      const { width, height } = this.size;
+      if (width > 20 && height > 20) this.draw(width, height);
     });
   }
 

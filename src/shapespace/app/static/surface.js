@@ -31,7 +31,11 @@ export class Surface {
     this.makeSkin();
     this.makeArrows();
     this.makeRings();
-    new ResizeObserver(() => this.due()).observe(host);
+    this.room = { width: 0, height: 0 };
+    new ResizeObserver(([{ contentRect }]) => {
+      this.room = contentRect;
+      this.due();
+    }).observe(host);
   }
 
   makeSkin() {
@@ -221,9 +225,10 @@ export class Surface {
   }
 
   render() {
-    const { clientWidth: width, clientHeight: height } = this.host;
+    const { width, height } = this.room;
     if (!width || !height) return;
-    this.renderer.setSize(width, height, false);
+    if (this.room !== this.filled) this.renderer.setSize(width, height, false);
+    this.filled = this.room;
     if (this.extent) this.placeCamera(width, height);
     this.renderer.render(this.scene, this.camera);
   }

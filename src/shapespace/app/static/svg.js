@@ -12,11 +12,14 @@ export function make(name, attributes = {}, ...children) {
   return element;
 }
 
-const pen = document.createElement("canvas").getContext("2d");
+let pen = null;
 
 /** How wide text is in a drawing, in pixels. */
 export function widthOf(text) {
-  pen.font = `11px ${getComputedStyle(document.body).fontFamily}`;
+  if (!pen) {
+    pen = document.createElement("canvas").getContext("2d");
+    pen.font = `11px ${getComputedStyle(document.body).fontFamily}`;
+  }
   return pen.measureText(text).width;
 }
 
