@@ -97,16 +97,23 @@ def test_a_map_is_shown_without_its_damaged_boundary_points(
     assert has_shape(browser)
 
 
-@pytest.mark.parametrize("name", ["outcome", "velocity"])
+@pytest.mark.parametrize("name", ["outcome", "velocity", "shear_dissipation"])
 def test_a_map_is_shown_without_its_damaged_tiles(
     browser: Browser, serve: Serve, stores: Stores, tmp_path: Path, name: str
 ):
     damaged = copy(stores.map, tmp_path / "damaged")
     cut(damaged / name / "c" / "0" / "0", 5)
     open_page(browser, serve(damaged), 0)
+    browser.choose("#choose-of", name if name != "outcome" else "velocity")
+    browser.settle()
     assert f"numbers are damaged ({name}, tile 0,0" in trouble(browser)
     assert has_shape(browser)
     canvas = "document.querySelector('#diagram canvas')"
+    browser.choose("#choose-of", "area")
+    browser.settle()
+    assert trouble(browser).count("are damaged") == 1
+    browser.choose("#choose-of", "velocity")
+    browser.settle()
     corner, rest = browser.run(
         f"[[0, 99], [60, 40]].map(([x, y]) => {canvas}.getContext('2d').getImageData(x, y, 1, 1).data[3])"
     )

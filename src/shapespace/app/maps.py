@@ -49,11 +49,12 @@ class DiagramSource(AbstractSource):
         self._damage = {}
 
     @property
-    def range(self) -> str:
+    def over(self) -> str:
         return f" over {' and '.join(self.store().request.grid.keys)}"
 
     def damage(self) -> list[str]:
-        return [one for part in self._damage.values() for one in part]
+        # A copy, as what reads in the background adds to it.
+        return [one for part in [*self._damage.values()] for one in part]
 
     def _whole(self, name: str) -> Array:
         """One array on all points (state, y, x), the fill value where it is damaged."""
@@ -106,14 +107,14 @@ class DiagramSource(AbstractSource):
                 yield collected(store.scenario, (first, second), [*points.values()], store.outcome, path)
 
     def values(self, name: str) -> dict[str, Any]:
-        """One observable on all points (state, y, x), NaN where there is no state."""
+        """One observable on all points (state, y, x), NaN where there is no state, and what of it is damaged."""
         numbers = self.numbers()
         if name not in numbers.names:
             raise InputError(f"{name[:60]}: is no observable of this diagram.")
         if name == REGIME:
             return self._regimes()
         values = np.where(self._whole(OUTCOME) == IS_STATE, self._whole(name), np.nan)
-        return {"name": name, "values": exact(values)}
+        return {"name": name, "values": exact(values), "damage": self._damage[name]}
 
     def _regimes(self) -> dict[str, Any]:
         """What each state is like, in the aspects that differ somewhere; kinds: what numbers mean, in words and as a colour."""
@@ -125,7 +126,8 @@ class DiagramSource(AbstractSource):
         kinds = [int(code) for code in np.unique(codes & aspects) if code]
         colours = [one for one in REGIMES if one != GREY]
         about = [[code, describe(code), colours[i % len(colours)]] for i, code in enumerate(kinds)]
-        return {"name": REGIME, "values": exact(np.where(codes > 0, codes & aspects, np.nan)), "kinds": about}
+        values = np.where(codes > 0, codes & aspects, np.nan)
+        return {"name": REGIME, "values": exact(values), "damage": self._damage[REGIME], "kinds": about}
 
     def state(self, place: str) -> dict[str, Any]:
         number, i, j = self._place(place)

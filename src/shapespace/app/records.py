@@ -169,7 +169,7 @@ class BranchSource(AbstractRecords[BranchPoint]):
         )
 
     @property
-    def range(self) -> str:
+    def over(self) -> str:
         return f" in {self.request['key']}"
 
     @property
@@ -242,7 +242,7 @@ class CurveSource(AbstractRecords[CurvePoint]):
     kind = CurveStore
 
     @property
-    def range(self) -> str:
+    def over(self) -> str:
         return f"{f' of {self._of}s' if self._of else ''} in {' and '.join(self.keys)}"
 
     @property

@@ -69,7 +69,7 @@ class AbstractSource(ABC):
         return self.noun
 
     @property
-    def range(self) -> str:
+    def over(self) -> str:
         """Over which keys, in words; empty where none changes."""
         return ""
 
@@ -115,7 +115,7 @@ class AbstractSource(ABC):
         at = store.scenario
         return {
             "noun": self.noun,
-            "words": f"{at.name}: {self.called}{self.range}, {store.outcome or 'unfinished'}",
+            "words": f"{at.name}: {self.called}{self.over}, {store.outcome or 'unfinished'}",
             "name": self.path.resolve().name,
             "path": str(self.path.resolve()),
             "scenario": at.name,

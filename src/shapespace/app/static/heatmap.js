@@ -85,8 +85,10 @@ export class Heatmap extends Chart {
     refill(this.tools, ...tools);
     const wanted = name;
     await session.attempt("", async () => {
-      const { values, kinds } = await recall("values", { store: view.get("store"), name });
-      if (this.map && wanted === this.name) Object.assign(this, { values, kinds });
+      const { values, kinds, damage } = await recall("values", { store: view.get("store"), name });
+      if (!this.map || wanted !== this.name) return;
+      Object.assign(this, { values, kinds });
+      session.addDamage(damage);
     });
     this.due();
   }
@@ -151,14 +153,18 @@ export class Heatmap extends Chart {
       }
     }
     this.canvas.getContext("2d").putImageData(image, 0, 0);
-    this.describe(scale, codes);
+    this.describe(scale, codes, values);
   }
 
-  describe(scale, codes) {
+  describe(scale, codes, values) {
     this.legend.replaceChildren(...(this.kinds ? this.kinds.map(sampleOf) : scale ? [this.bar(scale)] : []));
-    if (codes.some((code) => code !== IS_STATE && code !== NOT_COMPUTED)) {
+    const lacking = [
+      codes.some((code) => code !== IS_STATE && code !== NOT_COMPUTED) && "no state",
+      codes.some((code, k) => code === IS_STATE && !Number.isFinite(values[k])) && `no ${plain(this.name)}`,
+    ].filter(Boolean);
+    if (lacking.length) {
       const none = document.createElement("span");
-      none.innerHTML = '<i class="bar none"></i> no state';
+      none.innerHTML = `<i class="bar none"></i> ${escaped(lacking.join(" or "))}`;
       this.legend.append(none);
     }
     if (codes.some((code) => code === NOT_COMPUTED)) {

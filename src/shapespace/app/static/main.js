@@ -56,7 +56,7 @@ session.on("state", () => {
   for (const id of ["continue", "python"]) element(id).disabled = !session.state.python;
 });
 session.on("trouble", () => {
-  const told = [session.trouble, ...damageWords(session.overview?.damage ?? [])].filter(Boolean);
+  const told = [session.trouble, ...damageWords([...session.damage])].filter(Boolean);
   element("trouble").textContent = told.join("\n");
   element("trouble").hidden = !told.length;
 });

@@ -9,6 +9,7 @@ export const session = new (class extends EventTarget {
   state = null;
   mode = null;
   trouble = "";
+  damage = new Set();
   doing = [];
   opened = 0;
   asked = 0;
@@ -45,12 +46,13 @@ export const session = new (class extends EventTarget {
   async openStore() {
     const number = ++this.opened;
     forget();
-    Object.assign(this, { overview: null, state: null, mode: null, wanted: "", trouble: "" });
+    Object.assign(this, { overview: null, state: null, mode: null, wanted: "", trouble: "", damage: new Set() });
     this.tell("closed");
     await this.attempt("reading the store", async () => {
       const overview = await ask("overview", { store: view.get("store") });
       if (number !== this.opened) return;
       this.overview = overview;
+      this.addDamage(overview.damage);
       this.tell("overview");
       await this.follow();
     });
@@ -139,6 +141,12 @@ export const session = new (class extends EventTarget {
     this.mode = null;
     view.set({ mode: "" });
     this.tell("mode");
+  }
+
+  /** What cannot be read of the store is told as long as it is open. */
+  addDamage(damage) {
+    for (const one of damage) this.damage.add(one);
+    this.tell("trouble");
   }
 
   /** Do something that may fail, and say so until something else is tried. Words say what is waited for. */
