@@ -45,6 +45,7 @@ export const session = new (class extends EventTarget {
   /** Show the store that is looked at; one that is opened later wins. */
   async openStore() {
     const number = ++this.opened;
+    this.asked++;
     forget();
     Object.assign(this, { overview: null, state: null, mode: null, wanted: "", trouble: "", damage: new Set() });
     this.tell("closed");
@@ -65,7 +66,7 @@ export const session = new (class extends EventTarget {
     const mode = view.get("mode");
     if (place && place !== this.wanted) await this.choose(place);
     else if (mode === "" && this.mode) this.stopMode();
-    else if (mode !== "" && this.state?.fields && this.mode?.index !== Number(mode)) await this.animate(Number(mode));
+    else if (mode !== "" && this.state?.fields && !this.state.isComing && this.mode?.index !== Number(mode)) await this.animate(Number(mode));
   }
 
   /** Show the state at a place; one that is asked for later wins. */
@@ -123,14 +124,14 @@ export const session = new (class extends EventTarget {
 
   /** Set the surface swinging along a mode. */
   async animate(index) {
-    const { state } = this;
+    const { state, opened } = this;
     if (state.rates ? !(index < state.rates.values.length) : !state.can_compute) {
       view.set({ mode: "" });
       return;
     }
     await this.attempt(state.can_compute ? "computing the mode …" : "", async () => {
       const mode = await recall("mode", { store: view.get("store"), place: state.place, index });
-      if (state.place !== this.state?.place) return;
+      if (opened !== this.opened || state.place !== this.state?.place) return;
       this.mode = mode;
       view.set({ mode: index });
       this.tell("mode");
