@@ -91,5 +91,6 @@ class DiagramNumbers:
                 yield
             except (RuntimeError, ValueError) as error:
                 raise StoreError(
-                    f"{self._path}: numbers are damaged ({part}: {error}); restore it, or compute it again with another --out."
+                    f"{self._path}: numbers in it are damaged ({part}: {error}); restore it, or compute it again with "
+                    "another --out."
                 ) from None
