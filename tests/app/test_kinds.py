@@ -126,6 +126,21 @@ def test_boundaries_of_a_map_are_told_apart(browser: Browser, whole: Explorer):
         assert text(browser, "#tip").endswith(f"boundary: {kind}s")
 
 
+def test_special_points_beyond_a_map_are_not_named_beside_it(browser: Browser, whole: Explorer):
+    open_page(browser, whole, STATES)
+    browser.run(
+        "import('./session.js').then(({ session }) => {"
+        "for (const { keys, labels } of session.overview.map.boundaries) labels.push(['far', 'cusp', 1e3, 1e3]); })"
+    )
+    browser.press("t")
+    browser.settle()
+    assert (
+        browser.all("#diagram .special", "e.dataset.label")
+        == browser.all("#diagram .special-label", "e.textContent")
+        == ["cusp-1"]
+    )
+
+
 def test_boundaries_show_on_pale_and_on_dark_maps(browser: Browser, whole: Explorer):
     """The line is dark and its rim pale in both themes, as maps are the same in both."""
     open_page(browser, whole, STATES, theme="light")

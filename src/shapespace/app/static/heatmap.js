@@ -186,15 +186,18 @@ export class Heatmap extends Chart {
   }
 
   boundaries(layer) {
-    const wanted = [];
+    const named = [];
     this.lines = (this.map.boundaries ?? []).map(({ of, x: first, y: second, keys, labels }) => {
       const isTurned = keys[0] === this.map.y.key;
       const [x, y] = isTurned ? [second, first] : [first, second];
       // Dark on a pale rim in both themes, as the colours of a map are the same in both.
       layer.append(this.path(x, y, { class: "boundary rim" }), this.path(x, y, { class: `boundary ${of}` }));
-      for (const [text, kind, a, b] of labels) wanted.push({ text, kind, x: this.x(isTurned ? b : a), y: this.y(isTurned ? a : b) });
+      for (const [text, kind, a, b] of labels) named.push({ text, kind, x: this.x(isTurned ? b : a), y: this.y(isTurned ? a : b) });
       return { of, points: Array.from(x, (value, k) => [this.x(value), this.y(y[k])]) };
     });
+    // Curves may go beyond the map.
+    const { left, right, top, bottom } = this.box;
+    const wanted = named.filter(({ x, y }) => x >= left - 1 && x <= right + 1 && y >= top - 1 && y <= bottom + 1);
     for (const { text, kind, x, y } of wanted) layer.append(mark(kind, x, y, { label: text }));
     placeLabels(wanted, this.lines.map(({ points }) => points), this.box, this.overlay);
     for (const of of new Set(this.lines.map((line) => line.of))) {
