@@ -85,6 +85,11 @@ def watch(browser: Browser, server: "subprocess.Popen[str]", began: float) -> No
     browser.wait("!!document.body.dataset.stage")
     size = browser.run("performance.getEntriesByType('resource').reduce((sum, one) => sum + one.encodedBodySize, 0)")
     print(f"    transferred: {size / 1e6:.1f} MB")
+    began, worked = time.perf_counter(), processor_seconds(server)
+    wait_until_idle(server)
+    print(
+        f"    idle {time.perf_counter() - began:.1f} s later, processor time {processor_seconds(server) - worked:.1f} s"
+    )
     random = np.random.default_rng(1)
     places, worked = random.uniform(0.15, 0.85, (CLICKS, 2)), processor_seconds(server)
     times = np.array([one for x, y in places if (one := browser.run(CLICK % (x, y))) is not None])
@@ -95,6 +100,14 @@ def watch(browser: Browser, server: "subprocess.Popen[str]", began: float) -> No
         print(f"    numbers: median {middle[0]:.0f} ms, longest {worst[0]:.0f} ms; "
               f"shape: median {middle[1]:.0f} ms, longest {worst[1]:.0f} ms; "
               f"on the screen, drawn in software: median {middle[2]:.0f} ms, longest {worst[2]:.0f} ms")  # fmt: skip
+
+
+def wait_until_idle(server: "subprocess.Popen[str]", quiet: float = 0.5) -> None:
+    """Until the server has loaded all that it does in the background."""
+    before = -1.0
+    while processor_seconds(server) > before:
+        before = processor_seconds(server)
+        time.sleep(quiet)
 
 
 def processor_seconds(server: "subprocess.Popen[str]") -> float:

@@ -30,6 +30,8 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
 )
 PATIENCE = 60.0
+KEYS = {"Enter": (13, "\r"), "Escape": (27, ""), "Tab": (9, ""), " ": (32, " ")}
+"""Codes and letters of keys by which a browser does something of its own."""
 
 
 class Browser:
@@ -137,6 +139,7 @@ class Browser:
     def resize(self, width: int, height: int, *, mobile: bool = False) -> None:
         """The size of the window, in pixels."""
         scale = 2 if mobile else 1
+        self.send("Emulation.setTouchEmulationEnabled", enabled=mobile)
         self.send(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=scale, mobile=mobile
         )
@@ -173,11 +176,11 @@ class Browser:
         return list(json.loads(self.run(script)))
 
     def press(self, key: str, text: str = "") -> None:
-        """Press and release a key."""
-        for kind in ("keyDown", "keyUp"):
-            self.send(
-                "Input.dispatchKeyEvent", type=kind, key=key, **({"text": text} if text and kind == "keyDown" else {})
-            )
+        """Press and release a key; what it does where nobody listens for it is done too."""
+        code, letter = KEYS.get(key, (0, ""))
+        told = {"key": key, "windowsVirtualKeyCode": code}
+        self.send("Input.dispatchKeyEvent", type="keyDown", text=text or letter, **told)
+        self.send("Input.dispatchKeyEvent", type="keyUp", **told)
 
     def picture(self, path: Path, *, full: bool = False) -> None:
         """Save what is to be seen."""

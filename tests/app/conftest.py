@@ -8,7 +8,7 @@ import pytest
 
 if TYPE_CHECKING:
     from tests.app.browser import Browser
-    from tests.app.served import Stores
+    from tests.app.served import MoreStores, Stores
 
     from shapespace.app.explore import Explorer
 
@@ -16,11 +16,17 @@ if TYPE_CHECKING:
 @pytest.fixture(scope="session")
 def stores(tmp_path_factory: pytest.TempPathFactory) -> "Stores":
     """To be read only."""
-    from tests.app.served import Stores
-    from tests.app.stores import make_branch, make_map, make_run
+    from tests.app.stores import make_stores
 
-    folder = tmp_path_factory.mktemp("explored")
-    return Stores(make_run(folder / "run"), make_branch(folder / "branch"), make_map(folder / "map", 100))
+    return make_stores(tmp_path_factory.mktemp("explored"))
+
+
+@pytest.fixture(scope="session")
+def more(stores: "Stores", tmp_path_factory: pytest.TempPathFactory) -> "MoreStores":
+    """To be read only, as those above."""
+    from tests.app.stores import make_more
+
+    return make_more(tmp_path_factory.mktemp("more"), stores.branch)
 
 
 @pytest.fixture(scope="session")
@@ -29,6 +35,15 @@ def explorer(stores: "Stores") -> "Iterator[Explorer]":
     from tests.app.served import serving
 
     with serving(*stores) as found:
+        yield found
+
+
+@pytest.fixture(scope="session")
+def whole(stores: "Stores", more: "MoreStores") -> "Iterator[Explorer]":
+    """Serving these and those, in their order."""
+    from tests.app.served import serving
+
+    with serving(*stores, *more) as found:
         yield found
 
 
@@ -42,7 +57,7 @@ def serve() -> "Iterator[Callable[..., Explorer]]":
 
 
 @pytest.fixture(scope="session")
-def browser() -> "Iterator[Browser]":
+def program() -> "Iterator[Browser]":
     """A browser for all tests."""
     from tests.app.browser import PROGRAM, chromium
 
@@ -51,3 +66,13 @@ def browser() -> "Iterator[Browser]":
         pytest.skip("needs Chromium (Debian: apt install chromium)")
     with chromium() as found:
         yield found
+
+
+@pytest.fixture
+def browser(program: "Browser") -> "Iterator[Browser]":
+    """The same; no test leaves an error on its console."""
+    program.errors.clear()
+    program.requests.clear()
+    program.resize(1280, 800)
+    yield program
+    assert not program.errors

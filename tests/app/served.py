@@ -17,6 +17,16 @@ class Stores(NamedTuple):
     map: Path
 
 
+class MoreStores(NamedTuple):
+    """Directories of a branch with a fold, curves of folds and of pitchforks, a search, and a map of two states."""
+
+    division: Path
+    folds: Path
+    forks: Path
+    search: Path
+    states: Path
+
+
 @contextmanager
 def serving(*stores: Path) -> Iterator[Explorer]:
     """An explorer that answers until the end of the block."""

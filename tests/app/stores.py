@@ -1,19 +1,24 @@
 """Small stores of every kind, and a large map of spheres, whose states are known without solving."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from tests.app.served import MoreStores, Stores
 
 from shapespace.base.outcome import Outcome
 from shapespace.study.branching import branch
-from shapespace.study.diagram_store import CODES, OUTCOME, REGIME, Anchors, DiagramRequest, DiagramStore
-from shapespace.study.diagrams import make_request
+from shapespace.study.curve_store import CurveStore
+from shapespace.study.curves import curve
+from shapespace.study.diagram_store import CODES, CURVES, OUTCOME, REGIME, Anchors, DiagramRequest, DiagramStore
+from shapespace.study.diagrams import diagram, make_request
 from shapespace.study.engine import Engine
 from shapespace.study.grid import Axis, Grid
 from shapespace.study.named import reference
 from shapespace.study.regimes import Regime
 from shapespace.study.run import run
 from shapespace.study.scenario import Scenario, scenario
+from shapespace.study.searching import search_states
 from shapespace.study.steady import observables_at
 from shapespace.study.tiles import observable_names
 
@@ -25,6 +30,23 @@ def swimmer(**changes: float) -> Scenario:
     return scenario("polar-swimmer", elements=20, mesh_tolerance=1e-3, **changes)
 
 
+def make_stores(folder: Path) -> Stores:
+    """Those that most tests need."""
+    return Stores(make_run(folder / "run"), make_branch(folder / "branch"), make_map(folder / "map", 100))
+
+
+def make_more(folder: Path, spheres: Path) -> MoreStores:
+    """Of the other kinds. spheres: the branch above."""
+    division = make_division(folder / "division")
+    return MoreStores(
+        division,
+        make_curve(folder / "folds", f"{division}:fold-1", X, 460.0),
+        make_curve(folder / "forks", f"{spheres}:pitchfork-1", "turnover_rate", 11.0),
+        make_search(folder / "search"),
+        make_states(folder / "states"),
+    )
+
+
 def make_branch(path: Path) -> Path:
     """The sphere through the onset of swimming."""
     branch(swimmer(), X, 24.0, start=20.0, at=(23.0,), state="trivial", out=path)
@@ -34,6 +56,40 @@ def make_branch(path: Path) -> Path:
 def make_run(path: Path, until: float = 0.02) -> Path:
     """The first steps of a division."""
     run(scenario("guided-division", elements=20, mesh_tolerance=1e-3, until=until), out=path)
+    return path
+
+
+def make_division(path: Path) -> Path:
+    """Past the first fold of guided division; its curve bends, and ends where special points crowd."""
+    division = scenario("guided-division", elements=20, mesh_tolerance=1e-2)
+    branch(division, "ring_amplitude", 2.4, start=0.0, state="trivial", out=path)
+    return path
+
+
+def make_curve(path: Path, origin: str, key: str, stop: float) -> Path:
+    """Of a special point, a little way."""
+    curve(origin, key, stop, out=path)
+    return path
+
+
+def make_search(path: Path) -> Path:
+    """Two states, of which one is stable."""
+    search_states(swimmer(peclet=24.0), max_tries=3, out=path)
+    return path
+
+
+def make_states(path: Path) -> Path:
+    """A map of two states, one of which is not everywhere, with the pitchforks between and folds that are made up."""
+    axes = f"{X}=20:36:6", "turnover_rate=8:12:4"
+    diagram(swimmer(), *axes, states=("trivial", "default"), stability=True, boundaries=True, workers=1, out=path)
+    (forks,) = (path / CURVES).iterdir()
+    known = CurveStore.open(forks)
+    aside = np.array([3.0 if key == X else 0.0 for key in known.request["keys"]])
+    with CurveStore.create(path / CURVES / "made-up", known.scenario, known.request) as store:
+        for number, point in enumerate(known):
+            named = {"label": "cusp-1", "kind": "cusp"} if number == len(known) // 2 else {}
+            store.append(replace(point, of="fold", parameters=point.parameters + aside, **named))
+        store.finish(Outcome.REACHED_STOP)
     return path
 
 

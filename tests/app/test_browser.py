@@ -2,53 +2,20 @@
 
 import json
 import math
-import shutil
-from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.app.browser import Browser
+from tests.app.pages import BRANCH, MAP, RUN, has_shape, open_page, shown, title
 from tests.app.served import Stores
 from tests.app.stores import made_up
 
-from shapespace.app.explore import Explorer, export
+from shapespace.app.explore import Explorer
 from shapespace.study.branch_store import BranchStore, open_branch
 from shapespace.study.store import RunStore
 
-RUN, BRANCH, MAP = 0, 1, 2
 LABEL = "pitchfork-1"
-
-
-@pytest.fixture(autouse=True)
-def nothing_goes_wrong(browser: Browser) -> Iterator[None]:
-    """No test leaves an error on the console."""
-    browser.errors.clear()
-    browser.requests.clear()
-    browser.resize(1280, 800)
-    yield
-    assert not browser.errors
-
-
-def open_page(browser: Browser, explorer: Explorer, store: int, **view: object) -> None:
-    browser.open(explorer.address + "#" + "&".join(f"{key}={value}" for key, value in {"store": store, **view}.items()))
-    browser.settle()
-
-
-def shown(browser: Browser) -> dict[str, float]:
-    """The numbers on the page, by name."""
-    return {
-        name: float(value) for name, value in browser.all("#facts [data-name]", "[e.dataset.name, e.dataset.value]")
-    }
-
-
-def title(browser: Browser) -> str:
-    return str(browser.run("document.querySelector('#facts .title b').textContent"))
-
-
-def has_shape(browser: Browser) -> bool:
-    return bool(browser.run("!!document.querySelector('#outline .shape')"))
 
 
 def test_a_branch_shows_the_numbers_of_its_points(browser: Browser, explorer: Explorer, stores: Stores):
@@ -197,20 +164,50 @@ def test_what_is_chosen_comes_back_by_its_address(browser: Browser, explorer: Ex
     assert "velocity" in chosen[0]
 
 
-def test_python_and_commands_are_copied(browser: Browser, explorer: Explorer, stores: Stores):
+def clipboard(browser: Browser) -> str:
+    """What was copied last."""
+    browser.wait("!document.getElementById('toast').hidden")
+    return str(browser.run("navigator.clipboard.readText()"))
+
+
+def test_python_commands_and_links_are_copied(browser: Browser, explorer: Explorer, stores: Stores):
     browser.send("Browser.grantPermissions", permissions=["clipboardReadWrite", "clipboardSanitizedWrite"])
     open_page(browser, explorer, BRANCH)
     browser.click("#python")
-    browser.wait("!document.getElementById('toast').hidden")
     names: dict[str, Any] = {}
-    exec(browser.run("navigator.clipboard.readText()"), names)
+    exec(clipboard(browser), names)
     assert names["state"].observables["area"] == pytest.approx(4.0 * math.pi)
     browser.press("c")
-    command = browser.run("document.querySelector('#command-branch').textContent")
-    assert command.startswith("shapespace branch polar-swimmer ")
-    assert f"--from {stores.branch}:{LABEL}" in command
     browser.choose("dialog input", 77)
-    assert "--stop 77 " in browser.run("document.querySelector('#command-branch').textContent")
+    told = browser.all("dialog pre", "e.textContent")
+    assert len(told) == 4
+    for number, command in enumerate(told):
+        browser.click("dialog section button", number)
+        assert clipboard(browser) == command
+        assert command.startswith("shapespace ")
+        assert f"{stores.branch}:{LABEL}" in command
+    assert "--vary peclet --stop 77 " in told[2]
+    browser.press("Escape")
+    browser.press("ArrowRight")
+    browser.settle()
+    for copy in (lambda: browser.click("#link"), lambda: browser.press("l")):
+        copy()
+        link = clipboard(browser)
+        assert link == browser.run("location.href")
+    before = shown(browser)
+    open_page(browser, explorer, MAP)
+    browser.open(link)
+    browser.settle()
+    assert shown(browser) == before
+
+
+def test_options_of_a_command_are_not_broken(browser: Browser, explorer: Explorer):
+    browser.resize(390, 844, mobile=True)
+    open_page(browser, explorer, BRANCH)
+    browser.press("c")
+    rows = browser.all("dialog .option", "[e.textContent, e.getClientRects().length]")
+    assert {"--from", "--out", "--stop"} <= {word for word, _ in rows}
+    assert all(count == 1 for _, count in rows)
 
 
 def test_help_says_what_the_store_is(browser: Browser, explorer: Explorer, stores: Stores):
@@ -226,53 +223,3 @@ def test_no_other_machine_is_asked(browser: Browser, explorer: Explorer):
         open_page(browser, explorer, store)
     assert len(browser.requests) > 20
     assert not [one for one in browser.requests if not one.startswith((explorer.address, "about:", "data:"))]
-
-
-def test_an_exported_file_works_from_disk(browser: Browser, stores: Stores, tmp_path: Path):
-    file = export([stores.branch, stores.run], tmp_path / "explored.html")
-    branch = open_branch(stores.branch)
-    browser.open(file.as_uri())
-    browser.settle()
-    assert title(browser) == LABEL
-    assert shown(browser) == {**branch[LABEL].observables, "peclet": branch[LABEL].parameter}
-    assert has_shape(browser)
-    browser.press("1")
-    assert browser.wait("!!document.querySelector('#outline .moved')")
-    browser.press("s")
-    browser.settle()
-    last = RunStore.open(stores.run).read(-1)
-    assert shown(browser) == {**last.observables, "time": last.time}
-    assert {one for one in browser.requests if not one.startswith(("data:", "about:"))} == {file.as_uri()}
-
-
-def test_damaged_stores_say_so_and_the_rest_is_shown(
-    browser: Browser, serve: Callable[..., Explorer], stores: Stores, tmp_path: Path
-):
-    damaged = tmp_path / "damaged"
-    shutil.copytree(stores.run, damaged)
-    frame = damaged / "frames" / "000001.npz"
-    frame.write_bytes(frame.read_bytes()[:500])
-    explorer = serve(damaged, stores.branch)
-    open_page(browser, explorer, 0)
-    trouble = browser.run("document.getElementById('trouble').textContent")
-    assert str(frame) in trouble
-    assert "--resume" in trouble
-    # The answer that tells of it has a status of its own, which Chromium notes.
-    assert all("422" in one for one in browser.errors)
-    browser.errors.clear()
-    browser.press("s")
-    browser.choose("#store", 1)
-    browser.settle()
-    assert title(browser) == LABEL
-    assert browser.run("document.getElementById('trouble').hidden")
-
-
-@pytest.mark.parametrize(("width", "height"), [(1280, 800), (390, 844)])
-@pytest.mark.parametrize("theme", ["light", "dark"])
-def test_nothing_is_wider_than_the_screen(browser: Browser, explorer: Explorer, width: int, height: int, theme: str):
-    browser.resize(width, height, mobile=width < 600)
-    for store in (RUN, BRANCH, MAP):
-        open_page(browser, explorer, store, theme=theme)
-        assert browser.run("document.documentElement.scrollWidth") <= width
-        edges = browser.all("button, select, h2, .panel", "e.getBoundingClientRect().right")
-        assert max(edges) <= width + 1

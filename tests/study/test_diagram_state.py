@@ -83,6 +83,15 @@ def test_damaged_numbers_are_said_in_a_line(stored: Diagram, tmp_path: Path):
     # The first part is that of the first tile.
     with pytest.raises(StoreError, match=r"copy: numbers in it are damaged.*--out"):
         numbers.at(0, 0, 0)
+    values, damage = numbers.readable("length")
+    assert len(damage) == 1
+    assert "length, tile 0,0" in damage[0]
+    lost = np.isnan(values)
+    assert np.array_equal(values[~lost], DiagramNumbers(DiagramStore.open(stored.store)).whole("length")[~lost])
+    x, y = stored.request.grid.span((0, 0))
+    assert lost[..., y, x].all()
+    assert lost.sum() == lost[..., y, x].sum()
+    assert numbers.readable("area")[1] == []
 
 
 def test_numbers_of_an_unfinished_map_are_read_anew(stored: Diagram, tmp_path: Path):

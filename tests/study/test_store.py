@@ -230,6 +230,24 @@ def test_damaged_frame_is_named_with_the_remedy(tmp_path: Path, harm: str, numbe
         assert (len(store), store.outcome) == (number, None)
 
 
+@pytest.mark.parametrize("number", [0, 2, 4])
+@pytest.mark.parametrize("is_missing", [False, True])
+def test_a_damaged_store_may_be_looked_at_without_what_is_damaged(tmp_path: Path, number: int, is_missing: bool):
+    path = fill(tmp_path / "run", outcome=Outcome.REACHED_END)
+    file = frame_file(path, number)
+    if is_missing:
+        file.unlink()
+    else:
+        file.write_bytes(b"frame")
+    store = RunStore.open_damaged(path)
+    assert len(store) == 5
+    for other in {*range(5)} - {number}:
+        assert_same(store.read(other), make_frame(other))
+    assert str(file) in complaint(store.read, number)
+    (path / "store.json").unlink()
+    assert "no store.json" in complaint(RunStore.open_damaged, path)
+
+
 def test_any_changed_byte_is_found_or_harmless():
     frame = make_frame(3, elements=20)
     data = encode_frame(frame)

@@ -13,7 +13,7 @@ from tests.shell import Shell, one_complaint
 import shapespace as ss
 from shapespace.base.errors import InputError
 from shapespace.base.scales import QUANTITIES, Scales
-from shapespace.base.units import Dimension, Units, read_factors
+from shapespace.base.units import Dimension, Units, read_factors, with_micro
 from shapespace.study.run import Run
 from shapespace.study.scenario import Scenario, load_scenario, template
 
@@ -204,6 +204,8 @@ def test_texts_of_units():
     assert units.label(Dimension(-2, 1, 1)) == "pN s/um"
     for text, value in (("20 kT", 0.0823), ("2e-3 pN um", 2e-3), (".5pN*um", 0.5), ("-1 aJ", -1.0)):
         assert units.read("bending_rigidity", text, Dimension(energy=1)) == pytest.approx(value, rel=1e-3)
+    for text, printed in (("pN nm/um**2", "pN nm/μm^2"), ("uN/um", "μN/μm"), ("tau/fum", "tau/fum"), ("µs", "μs")):
+        assert with_micro(text) == printed
     for text in ("9^9^9^9 pN", "2 pN um)", "2 um^999", "5 pN/(um", "2 3 pN um"):
         with pytest.raises(InputError, match=r"^bending_rigidity = "):
             units.read("bending_rigidity", text, Dimension(energy=1))

@@ -6,7 +6,7 @@ from threading import Event, Lock
 from typing import TYPE_CHECKING, Any
 
 from shapespace.base.errors import InputError, StoreError
-from shapespace.study.records import noun_of
+from shapespace.study.records import holds_store, noun_of
 
 if TYPE_CHECKING:
     from shapespace.app.source import AbstractSource
@@ -61,7 +61,7 @@ class Catalogue:
         about = {"name": path.resolve().name, "path": str(path.resolve())}
         try:
             source = self.source(number)
-            return {**about, "noun": source.noun, "scenario": source.store().scenario.name}
+            return {**about, "noun": source.called, "scenario": source.store().scenario.name}
         except InputError as error:
             return {**about, "error": str(error)}
 
@@ -86,6 +86,11 @@ class Catalogue:
 
 def _source(path: Path) -> "AbstractSource":
     noun = noun_of(path)
+    if noun is None:
+        raise StoreError(
+            f"{path / 'store.json'}: is {'damaged or foreign' if holds_store(path) else 'missing'}; give the directory of a run, "
+            "a branch, a curve, a search or a diagram."
+        )
     if noun == "diagram":
         # Imported late, as the library of arrays on disk loads slowly.
         from shapespace.app.maps import DiagramSource
@@ -94,12 +99,11 @@ def _source(path: Path) -> "AbstractSource":
     from shapespace.app.records import BranchSource, CurveSource, RunSource, SearchSource
 
     kinds = {kind.noun: kind for kind in (RunSource, BranchSource, CurveSource, SearchSource)}
-    if noun is not None and noun not in kinds:
+    if noun not in kinds:
         raise StoreError(
             f"{path}: holds a {noun}, which the explorer does not know; give one of {', '.join(kinds)}, diagram."
         )
-    # What cannot be told is opened as a run, which says in a line what is wrong with it.
-    return kinds[noun or "run"](path)
+    return kinds[noun](path)
 
 
 def _text(asked: Mapping[str, str], name: str) -> str:

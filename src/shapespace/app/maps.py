@@ -9,12 +9,14 @@ import numpy as np
 
 from shapespace.app.encoding import codes, exact, finite
 from shapespace.app.source import AbstractSource, described
+from shapespace.app.tables import readable
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
-from shapespace.study.curve_store import Curve, outline
+from shapespace.study.curve_store import Curve, CurveStore, collected, outline
 from shapespace.study.diagram_numbers import DiagramNumbers
-from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, OUTCOME, REGIME, UNSTABLE, Diagram, DiagramStore
-from shapespace.study.frame import Frame
+from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, CURVES, OUTCOME, REGIME, UNSTABLE, DiagramStore
+from shapespace.study.frame import Array, Frame
+from shapespace.study.records import holds_store
 from shapespace.study.regimes import describe, telling_aspects
 from shapespace.study.scenario import Scenario
 from shapespace.study.telling import most_telling
@@ -39,10 +41,25 @@ class DiagramSource(AbstractSource):
         super().__init__(path)
         self._states: DiagramStates | None = None
         self._numbers: DiagramNumbers | None = None
+        self._damage: dict[str, list[str]] = {}
 
     def forget(self) -> None:
         super().forget()
         self._states = self._numbers = None
+        self._damage = {}
+
+    @property
+    def over(self) -> str:
+        return f" over {' and '.join(self.store().request.grid.keys)}"
+
+    def damage(self) -> list[str]:
+        # A copy, as what reads in the background adds to it.
+        return [one for part in [*self._damage.values()] for one in part]
+
+    def _whole(self, name: str) -> Array:
+        """One array on all points (state, y, x), the fill value where it is damaged."""
+        values, self._damage[name] = self.numbers().readable(name)
+        return values
 
     def store(self) -> DiagramStore:
         store = super().store()
@@ -54,11 +71,11 @@ class DiagramSource(AbstractSource):
         request, scenario = store.request, store.scenario
         numbers = self.numbers()
         names = [name for name in numbers.names if name not in (OUTCOME, *ABOUT_SOLUTION)]
-        outcomes = numbers.whole(OUTCOME)
+        outcomes = self._whole(OUTCOME)
         found = outcomes == IS_STATE
 
         def change(name: str) -> float:
-            values = numbers.whole(name)[found] if name in names else np.zeros(1)
+            values = self._whole(name)[found] if name in names else np.zeros(1)
             values = values[np.isfinite(values)]
             return float(np.ptp(values)) if values.size else 0.0
 
@@ -71,33 +88,46 @@ class DiagramSource(AbstractSource):
                 "strides": self._strides(),
                 "of": most_telling(scenario.kind, change),
                 "outcomes": codes(outcomes),
-                "boundaries": [_boundary(curve) for curve in Diagram(scenario, request, self.path).boundaries],
+                "boundaries": [_boundary(curve) for curve in self._boundaries()],
                 "meanings": {str(code): [str(outcome), outcome.advice] for outcome, code in CODES.items()},
             }
         }
 
+    def _boundaries(self) -> Iterator[Curve]:
+        """As far as they can be read."""
+        for path in sorted(path for path in (self.path / CURVES).glob("*") if holds_store(path)):
+            try:
+                store = CurveStore.open_damaged(path)
+            except StoreError as error:
+                self._damage[path.name] = [str(error)]
+                continue
+            points, self._damage[path.name] = readable(store)
+            first, second = store.request["keys"]
+            if points:
+                yield collected(store.scenario, (first, second), [*points.values()], store.outcome, path)
+
     def values(self, name: str) -> dict[str, Any]:
-        """One observable on all points (state, y, x), NaN where there is no state."""
+        """One observable on all points (state, y, x), NaN where there is no state, and what of it is damaged."""
         numbers = self.numbers()
         if name not in numbers.names:
             raise InputError(f"{name[:60]}: is no observable of this diagram.")
         if name == REGIME:
             return self._regimes()
-        values = np.where(numbers.whole(OUTCOME) == IS_STATE, numbers.whole(name), np.nan)
-        return {"name": name, "values": exact(values)}
+        values = np.where(self._whole(OUTCOME) == IS_STATE, self._whole(name), np.nan)
+        return {"name": name, "values": exact(values), "damage": self._damage[name]}
 
     def _regimes(self) -> dict[str, Any]:
         """What each state is like, in the aspects that differ somewhere; kinds: what numbers mean, in words and as a colour."""
         # Imported late: it brings the library of pictures.
         from shapespace.view.style import GREY, REGIMES
 
-        numbers = self.numbers()
-        codes = np.where(numbers.whole(OUTCOME) == IS_STATE, numbers.whole(REGIME), 0)
+        codes = np.where(self._whole(OUTCOME) == IS_STATE, self._whole(REGIME), 0)
         aspects = int(telling_aspects([*map(int, np.unique(codes[codes > 0]))]))
         kinds = [int(code) for code in np.unique(codes & aspects) if code]
         colours = [one for one in REGIMES if one != GREY]
         about = [[code, describe(code), colours[i % len(colours)]] for i, code in enumerate(kinds)]
-        return {"name": REGIME, "values": exact(np.where(codes > 0, codes & aspects, np.nan)), "kinds": about}
+        values = np.where(codes > 0, codes & aspects, np.nan)
+        return {"name": REGIME, "values": exact(values), "damage": self._damage[REGIME], "kinds": about}
 
     def state(self, place: str) -> dict[str, Any]:
         number, i, j = self._place(place)
@@ -122,8 +152,11 @@ class DiagramSource(AbstractSource):
 
     def places(self) -> Iterator[str]:
         i, j = self._strides()
-        outcomes = self.numbers().whole(OUTCOME)[:, ::j, ::i]
-        return (f"{s},{i * x},{j * y}" for s, y, x in np.argwhere(outcomes == IS_STATE))
+        return (f"{s},{i * x},{j * y}" for s, y, x in np.ndindex(self._whole(OUTCOME)[:, ::j, ::i].shape))
+
+    def _places_with_shape(self) -> list[str]:
+        i, j = self._strides()
+        return [f"{s},{i * x},{j * y}" for s, y, x in np.argwhere(self._whole(OUTCOME)[:, ::j, ::i] == IS_STATE)]
 
     def questions(self) -> Iterator[tuple[str, dict[str, str]]]:
         store = self.store()
@@ -132,8 +165,11 @@ class DiagramSource(AbstractSource):
             raise InputError(f"{self.path}: its {points} points are too many for one file, at most {MOST_POINTS}.")
         for name in self.numbers().names:
             yield "values", {"name": name}
+        has_shape = {*self._places_with_shape()}
         for place in self.places():
             yield "state", {"place": place}
+            if place not in has_shape:
+                continue
             try:
                 self.states().state(self._place(place))
             except StoreError:
@@ -142,7 +178,12 @@ class DiagramSource(AbstractSource):
             yield "shape", {"place": place}
 
     def warm(self) -> None:
-        self.shape(next(self.places()))
+        """And all numbers, as those of one point are some tens of small files."""
+        for place in self._places_with_shape()[:1]:
+            self.shape(place)
+        if self.store().outcome is not None:
+            for name in self.numbers().names:
+                self._whole(name)
 
     def _strides(self) -> tuple[int, int]:
         """Every how many points along x and y a file has a shape."""
@@ -221,5 +262,5 @@ def _boundary(curve: Curve) -> dict[str, Any]:
         "keys": curve.keys,
         "x": exact(x),
         "y": exact(y),
-        "labels": [[one.label, *one.parameters.tolist()] for one in named],
+        "labels": [[one.label, one.kind, *one.parameters.tolist()] for one in named],
     }

@@ -1,6 +1,6 @@
 """Stores whose states are records one after another: runs, branches, curves and searches."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 import numpy as np
 
 from shapespace.app.encoding import exact
-from shapespace.app.source import AbstractSource, described, rates_of
+from shapespace.app.source import AbstractSource, described, is_marginal, rates_of
+from shapespace.app.tables import columns_of, readable, table, telling
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint
@@ -18,7 +19,6 @@ from shapespace.study.frame import Array, Frame
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import SearchStore, Tried
 from shapespace.study.store import RunStore
-from shapespace.study.telling import most_telling
 
 if TYPE_CHECKING:
     from shapespace.study.modes import Modes
@@ -31,28 +31,34 @@ class AbstractRecords(AbstractSource, Generic[R]):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._all: list[R] | None = None
+        self._read: tuple[dict[int, R], list[str]] | None = None
 
     def forget(self) -> None:
         super().forget()
-        self._all = None
+        self._read = None
 
-    def records(self) -> list[R]:
-        """All records, in their stored order."""
+    def records(self) -> dict[int, R]:
+        """All records that are whole, by number."""
         store = self.store()
-        if self._all is None:
-            self._all = [*store]
-        return self._all
+        if self._read is None:
+            self._read = readable(store)
+        return self._read[0]
+
+    def damage(self) -> list[str]:
+        self.records()
+        assert self._read is not None
+        return self._read[1]
 
     def record(self, place: str) -> R:
         """One record. InputError where there is none of this number."""
         store = self.store()
         if not place.isdecimal() or not int(place) < len(store):
             raise InputError(f"{self.path}: has no state {place[:20]!r}; it has {len(store)} {store.folder}.")
-        return self._all[int(place)] if self._all is not None else store.read(int(place))
+        known = self._read[0] if self._read is not None else {}
+        return known[int(place)] if int(place) in known else store.read(int(place))
 
     def places(self) -> Iterator[str]:
-        return (str(number) for number in range(len(self.store())))
+        return map(str, self.records())
 
     def start(self, place: str, label: str = "") -> str:
         """The state as the command line finds it."""
@@ -69,30 +75,6 @@ class AbstractRecords(AbstractSource, Generic[R]):
         return None
 
 
-def table(
-    columns: dict[str, Any], x: str, y: str, places: Sequence[int], *, line: bool = True, **more: Any
-) -> dict[str, Any]:
-    """States as rows: numbers by name, what to draw first, the place of each, and what is known of each besides."""
-    packed = {name: exact(values) for name, values in columns.items()}
-    return {"table": {"columns": packed, "x": x, "y": y, "places": [str(one) for one in places], "line": line, **more}}
-
-
-def columns_of(rows: Sequence[dict[str, float]]) -> dict[str, Array]:
-    """Columns of rows, NaN where a row has no such number."""
-    names = dict.fromkeys(name for row in rows for name in row)
-    return {name: np.array([row.get(name, np.nan) for row in rows]) for name in names}
-
-
-def _telling(at: Scenario, columns: dict[str, Array], known: Sequence[str]) -> str:
-    def change(name: str) -> float:
-        values = columns.get(name, np.zeros(1))
-        values = values[np.isfinite(values)]
-        return float(np.ptp(values)) if values.size else 0.0
-
-    name = most_telling(at.kind, change, known)
-    return name if name in columns else next(iter(name for name in columns if name not in known), known[0])
-
-
 def _rates_of(point: BranchPoint | Tried) -> dict[str, Any] | None:
     """Growth rates as they are stored, None where none are."""
     if not len(point.growth_rates):
@@ -106,10 +88,14 @@ class RunSource(AbstractRecords[Frame]):
     noun = "run"
     kind = RunStore
 
+    @property
+    def called(self) -> str:
+        return "stationary state" if self.store().outcome is Outcome.CONVERGED else self.noun
+
     def content(self) -> dict[str, Any]:
         at, frames = self.store().scenario, self.records()
-        columns = columns_of([{"time": frame.time, **frame.observables} for frame in frames])
-        return table(columns, "time", _telling(at, columns, ["time"]), range(len(frames)))
+        columns = columns_of([{"time": frame.time, **frame.observables} for frame in frames.values()])
+        return table(columns, "time", telling(at, columns, ["time"]), [*frames])
 
     def state(self, place: str) -> dict[str, Any]:
         frame, store = self.record(place), self.store()
@@ -118,8 +104,9 @@ class RunSource(AbstractRecords[Frame]):
         if number == 0 and len(store) > 1:
             from shapespace.study.dataset import make_dataset
 
-            # The first state is given, not solved for: its flow is that of the first step.
-            first = make_dataset(at, [frame, store.read(1)], None).isel(time=0)
+            # The first state is given, not solved for: its flow is that of the first step, unknown where that is damaged.
+            later = [one for n, one in self.records().items() if n == 1]
+            first = make_dataset(at, [frame, *later], None).isel(time=0)
             fields = {name: first[name].to_numpy() for name in fields if name in first}
         modes = self.modes(place)
         rests = number == len(store) - 1 and store.outcome in (Outcome.STATIONARY, Outcome.CONVERGED)
@@ -131,7 +118,7 @@ class RunSource(AbstractRecords[Frame]):
             self.start(place),
             place=place,
             title=f"frame {number}" if len(store) > 1 else "stationary state",
-            time=frame.time,
+            time=frame.time if self.called == self.noun else None,
             rates=rates_of(modes.growth_rates, modes.errors, modes.parities, modes.neutral)
             if modes is not None
             else None,
@@ -147,7 +134,9 @@ class RunSource(AbstractRecords[Frame]):
         store = self.store()
         if store.outcome not in (Outcome.STATIONARY, Outcome.CONVERGED) or int(place) != len(store) - 1:
             raise InputError("this surface moves: growth rates belong to states at rest, as at the end of a run.")
-        return store.scenario, self.record(place)
+        from shapespace.study.steady import settled
+
+        return store.scenario, settled(store.scenario, self.record(place))
 
 
 class BranchSource(AbstractRecords[BranchPoint]):
@@ -158,7 +147,7 @@ class BranchSource(AbstractRecords[BranchPoint]):
 
     def content(self) -> dict[str, Any]:
         points, request = self.records(), self.request
-        order = sorted(range(len(points)), key=lambda i: points[i].place)
+        order = sorted(points, key=lambda number: points[number].place)
         ordered = [points[i] for i in order]
         key, free = request["key"], request.get("free")
         rows = [
@@ -166,7 +155,7 @@ class BranchSource(AbstractRecords[BranchPoint]):
             for one in ordered
         ]
         columns = columns_of([{key: row[key]} | row for row in rows])
-        y = free if free in columns else _telling(self.store().scenario, columns, (key, "arclength"))
+        y = free if free in columns else telling(self.store().scenario, columns, (key, "arclength"))
         return table(
             columns,
             key,
@@ -175,8 +164,13 @@ class BranchSource(AbstractRecords[BranchPoint]):
             labels=[one.label if one.label != START else "" for one in ordered],
             kinds=[one.kind if one.label != START else "" for one in ordered],
             unstable=[one.n_unstable for one in ordered],
+            marginal=[is_marginal(one.neutral) for one in ordered],
             segments=[_between(one, other) for one, other in pairwise(ordered)],
         )
+
+    @property
+    def over(self) -> str:
+        return f" in {self.request['key']}"
 
     @property
     def request(self) -> dict[str, Any]:
@@ -207,9 +201,7 @@ class BranchSource(AbstractRecords[BranchPoint]):
             title=label or f"point {place}",
             parameters={request["key"]: point.parameter, **({free: point.value} if free else {})},
             parameter_error=point.parameter_error if label else None,
-            rates=rates_of(point.growth_rates, point.growth_rate_errors, point.parities, point.neutral)
-            if len(point.growth_rates)
-            else None,
+            rates=_rates_of(point),
             unstable=point.n_unstable,
             can_compute=not len(point.modes) and free is None,
         )
@@ -250,6 +242,15 @@ class CurveSource(AbstractRecords[CurvePoint]):
     kind = CurveStore
 
     @property
+    def over(self) -> str:
+        return f"{f' of {self._of}s' if self._of else ''} in {' and '.join(self.keys)}"
+
+    @property
+    def _of(self) -> str:
+        """What the curve consists of, empty where nothing is stored yet."""
+        return next((one.of for one in self.records().values()), "")
+
+    @property
     def keys(self) -> tuple[str, str]:
         """Of the plane."""
         store = self.store()
@@ -259,7 +260,7 @@ class CurveSource(AbstractRecords[CurvePoint]):
 
     def content(self) -> dict[str, Any]:
         points, (x, y) = self.records(), self.keys
-        order = sorted(range(len(points)), key=lambda i: points[i].place)
+        order = sorted(points, key=lambda number: points[number].place)
         ordered = [points[i] for i in order]
         rows = [
             {x: float(one.parameters[0]), y: float(one.parameters[1]), **one.observables, "arclength": one.place}
@@ -274,7 +275,7 @@ class CurveSource(AbstractRecords[CurvePoint]):
             labels=[one.label if one.label != START else "" for one in ordered],
             kinds=[one.kind if one.label != START else "" for one in ordered],
             outline={"x": exact(line[0]), "y": exact(line[1])},
-            of=ordered[0].of if ordered else "",
+            of=self._of,
         )
 
     def scenario_at(self, point: CurvePoint) -> Scenario:
@@ -312,13 +313,13 @@ class SearchSource(AbstractRecords[Tried]):
     kind = SearchStore
 
     def places(self) -> Iterator[str]:
-        return (str(number) for number, one in enumerate(self.records()) if one.label)
+        return (str(number) for number, one in self.records().items() if one.label)
 
     def content(self) -> dict[str, Any]:
-        found = [(number, one) for number, one in enumerate(self.records()) if one.label]
+        found = [(number, one) for number, one in self.records().items() if one.label]
         rows: list[dict[str, float]] = [{"state": i + 1.0, **one.observables} for i, (_, one) in enumerate(found)]
         columns = columns_of(rows)
-        y = _telling(self.store().scenario, columns, ("state",)) if rows else "state"
+        y = telling(self.store().scenario, columns, ("state",)) if rows else "state"
         return table(
             columns,
             "state",
@@ -328,6 +329,7 @@ class SearchSource(AbstractRecords[Tried]):
             labels=[one.label for _, one in found],
             kinds=["state" for _ in found],
             unstable=[one.n_unstable for _, one in found],
+            marginal=[is_marginal(one.neutral) for _, one in found],
         ) | {"tried": len(self.store())}
 
     def state(self, place: str) -> dict[str, Any]:
@@ -342,9 +344,7 @@ class SearchSource(AbstractRecords[Tried]):
             self.start(place, one.label),
             place=place,
             title=one.label,
-            rates=rates_of(one.growth_rates, one.growth_rate_errors, one.parities, one.neutral)
-            if len(one.growth_rates)
-            else None,
+            rates=_rates_of(one),
             unstable=one.n_unstable,
             can_compute=True,
         )

@@ -93,14 +93,15 @@ def make_app(catalogue: Catalogue, token: str) -> Guard:
         return Response(known[name], headers=HEADERS | {"Content-Type": kind_of(name)})
 
     async def api(request: Request) -> Response:
-        def answer() -> tuple[int, bytes]:
+        def answer() -> bytes:
             try:
-                return 200, as_json(catalogue.answer(request.path_params["name"], request.query_params))
+                return as_json(catalogue.answer(request.path_params["name"], request.query_params))
             except InputError as error:
-                return 422, as_json({"error": str(error)})
+                # An answer too: a browser would report another status as a fault of the page.
+                return as_json({"error": str(error)})
 
-        status, content = await run_in_threadpool(answer)
-        return Response(content, status, HEADERS | {"Content-Type": "application/json"})
+        content = await run_in_threadpool(answer)
+        return Response(content, headers=HEADERS | {"Content-Type": "application/json"})
 
     routes = [
         Route("/{token}/api/{name}", api, methods=["GET"]),

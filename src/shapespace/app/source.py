@@ -12,7 +12,8 @@ import numpy as np
 from shapespace.app.commands import continuations, python_of
 from shapespace.app.encoding import drawn, finite, number
 from shapespace.base.errors import InputError
-from shapespace.base.scales import QUANTITIES
+from shapespace.base.scales import QUANTITIES, Quantity
+from shapespace.base.units import with_micro
 from shapespace.study.frame import Array, Frame
 from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import Scenario
@@ -24,6 +25,12 @@ KEPT = 32
 """States whose computed modes are kept."""
 POINTS = 241
 """Of a mode's profiles, as many as of a state's."""
+AT_REST = 1e-5
+"""Flows below this, in units of length over time of the scenario's scales, are what is left where a run counts as stationary."""
+ROUND_OFF = 1e-8
+"""Changes of other numbers below this, in units of the scales, are round-off, and drawn as none."""
+_DRAWN_AS_THEY_ARE = ("time", "discretisation_error", "boundary_residual")
+"""Numbers that are small by nature, as are keys."""
 
 
 class AbstractSource(ABC):
@@ -41,13 +48,13 @@ class AbstractSource(ABC):
         """Held by what computes: the page asks several things at once, and each would compile the same."""
 
     def store(self) -> AbstractRecordStore[Any]:
-        """The store, to read, as it is now. StoreError where it is damaged."""
+        """The store, to read, as it is now, whatever records of it are damaged. StoreError where none can be read."""
         stamp = tuple(
             file.stat().st_mtime_ns if file.exists() else 0
             for file in (self.path / "store.json", self.path / self.kind.folder)
         )
         if self._open is None or stamp != self._stamp:
-            self._open = self.kind.open(self.path)
+            self._open = self.kind.open_damaged(self.path)
             self._stamp = stamp
             self.forget()
         return self._open
@@ -56,13 +63,27 @@ class AbstractSource(ABC):
         """What was read of the store before it changed."""
         self._computed.clear()
 
+    @property
+    def called(self) -> str:
+        """What the store holds, in a word or two."""
+        return self.noun
+
+    @property
+    def over(self) -> str:
+        """Over which keys, in words; empty where none changes."""
+        return ""
+
+    @abstractmethod
+    def damage(self) -> list[str]:
+        """What cannot be read of the store, each with its file, after everything that the overview needs was read."""
+
     @abstractmethod
     def content(self) -> dict[str, Any]:
         """What is special to this kind of store in the overview: a `table` of states, or a `map`."""
 
     @abstractmethod
     def places(self) -> Iterator[str]:
-        """Places of all states; of very many, of those that a file has."""
+        """Places that may be looked at; of very many, those that a file has."""
 
     @abstractmethod
     def state(self, place: str) -> dict[str, Any]:
@@ -74,7 +95,7 @@ class AbstractSource(ABC):
 
     @abstractmethod
     def resting(self, place: str) -> tuple[Scenario, Frame]:
-        """A state at rest whose modes may be computed. InputError where it does not rest, or rests under a control."""
+        """A solution whose modes may be computed. InputError where the state does not rest, or rests under a control."""
 
     def warm(self) -> None:
         """Load what showing a state needs. InputError, StopIteration where there is none."""
@@ -90,10 +111,11 @@ class AbstractSource(ABC):
 
     def overview(self) -> dict[str, Any]:
         """What the store holds and how it came about."""
-        store = self.store()
+        store, content = self.store(), self.content()
         at = store.scenario
         return {
             "noun": self.noun,
+            "words": f"{at.name}: {self.called}{self.over}, {store.outcome or 'unfinished'}",
             "name": self.path.resolve().name,
             "path": str(self.path.resolve()),
             "scenario": at.name,
@@ -105,13 +127,18 @@ class AbstractSource(ABC):
             "outcome": store.outcome,
             "advice": store.outcome.advice if store.outcome else f"The {self.noun} is not finished.",
             "quantities": quantities(at),
-            **self.content(),
+            "at_rest": AT_REST * at.scales.factor("velocity"),
+            "damage": self.damage(),
+            **content,
         }
 
     def spectrum(self, place: str) -> dict[str, Any]:
         """Leading growth rates of a state, computed where they are not stored; that may take seconds."""
         modes = self._modes(place)
-        return rates_of(modes.growth_rates, modes.errors, modes.parities, modes.neutral)
+        growing = [i for i, rate in enumerate(modes.growth_rates[:, 0]) if rate > 0.0 and i not in modes.neutral]
+        # Where all that are known grow there may be more.
+        unstable = len(growing) if len(growing) < len(modes.growth_rates) else None
+        return rates_of(modes.growth_rates, modes.errors, modes.parities, modes.neutral) | {"unstable": unstable}
 
     def mode(self, place: str, index: int) -> dict[str, Any]:
         """The mode of a growth rate, by the number that it has in the state's own list."""
@@ -138,18 +165,24 @@ class AbstractSource(ABC):
     def _computed_modes(self, place: str) -> "Modes":
         if place not in self._computed:
             # Imported late: solvers take seconds to load, and most states are only looked at.
-            from shapespace.study.steady import modes_near
+            from shapespace.study.steady import modes_at
 
-            self._computed[place] = modes_near(*self.resting(place))
+            self._computed[place] = modes_at(*self.resting(place))
             if len(self._computed) > KEPT:
                 self._computed.popitem(last=False)
         return self._computed[place]
 
 
-def quantities(at: Scenario) -> dict[str, list[str]]:
-    """Symbol, meaning and unit of every quantity by its name."""
+def quantities(at: Scenario) -> dict[str, list[str | float]]:
+    """Symbol, meaning, unit, and the least change that is drawn as one, of every quantity by its name."""
+    as_they_are = {*at.values(), *_DRAWN_AS_THEY_ARE}
+
+    def least(name: str, quantity: Quantity) -> float:
+        small = AT_REST if quantity.dimension == QUANTITIES["velocity"].dimension else ROUND_OFF
+        return 0.0 if name in as_they_are else small * at.scales.factor(name)
+
     return {
-        name: [quantity.symbol, quantity.meaning, at.scales.unit(name).replace("**", "^")]
+        name: [quantity.symbol, quantity.meaning, with_micro(at.scales.unit(name)), least(name, quantity)]
         for name, quantity in QUANTITIES.items()
     }
 
@@ -187,7 +220,13 @@ def rates_of(rates: Array, errors: Array, parities: Sequence[str | None], neutra
         "errors": [number(error) for error in errors.tolist()],
         "parities": list(parities),
         "neutral": {str(i): name or CRITICAL for i, name in neutral.items()},
+        "marginal": is_marginal(neutral),
     }
+
+
+def is_marginal(neutral: Mapping[int, str]) -> bool:
+    """Whether stability changes at a state: a rate vanishes within its error, and no symmetry or conservation law is why."""
+    return "" in neutral.values()
 
 
 def mode_of(modes: "Modes", index: int) -> dict[str, Any]:

@@ -21,6 +21,7 @@ THERMAL_ENERGY = "kT = boltzmann_constant * 298.15 kelvin = k_BT"
 _OF = {"length": "[length]", "energy": "[energy]", "time": "[time]"}
 _EXAMPLES = {"length": "um", "energy": "pN um", "time": "s", "concentration": "1/um^2"}
 _FACTOR = re.compile(r"([^\W\d]+|%)(?:\^(-?\d{1,2}))?")
+_MICRO = re.compile(r"(?<![A-Za-z])u(?=(?:m|s|g|N|M|J|Pa|l|L|mol)(?![A-Za-z]))")
 _VALUE = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*[*\s]?\s*(\S.*?)\s*")
 
 
@@ -63,6 +64,11 @@ def write_factors(powers: Iterable[tuple[str, int]]) -> str:
             (above if power > 0 else below).append(name if abs(power) == 1 else f"{name}^{abs(power)}")
     text = " ".join(above) or "1"
     return f"{text}/{' '.join(below) if len(below) == 1 else '(' + ' '.join(below) + ')'}" if below else text
+
+
+def with_micro(text: str) -> str:
+    """A unit as it is printed: micro, which files write u, as a Greek letter; powers with ^."""
+    return _MICRO.sub("μ", text.replace("**", "^").replace("µ", "μ"))
 
 
 def read_dimension(text: str) -> Dimension:

@@ -26,7 +26,7 @@ class DiagramNumbers:
     """
 
     def __init__(self, store: DiagramStore) -> None:
-        self._path, self._is_finished = store.path, store.outcome is not None
+        self._path, self._is_finished, self._grid = store.path, store.outcome is not None, store.request.grid
         with storage(store.path), zarr.config.set(TOGETHER):
             try:
                 group: Any = zarr.open_group(store.path, mode="r")
@@ -42,12 +42,28 @@ class DiagramNumbers:
         """An array (states, n_y, n_x)."""
         if name in self._read:
             return self._read[name]
-        with self._reading():
+        with self._reading(name):
             values = np.asarray(self._arrays[name][...])
         values = values.reshape(-1, *values.shape[-2:])
         if self._is_finished:
             self._read[name] = values
         return values
+
+    def readable(self, name: str) -> tuple[Array, list[str]]:
+        """As `whole`, tile by tile where that fails: the fill value in tiles that are damaged, and what is wrong with each."""
+        try:
+            return self.whole(name), []
+        except StoreError:
+            array, damaged = self._arrays[name], []
+            values = np.full(array.shape, array.fill_value, array.dtype)
+        for tile in self._grid.tiles:
+            x, y = self._grid.span(tile)
+            try:
+                with self._reading(f"{name}, tile {tile[0]},{tile[1]}"):
+                    values[..., y, x] = array[..., y, x]
+            except StoreError as error:
+                damaged.append(str(error))
+        return values.reshape(-1, *values.shape[-2:]), damaged
 
     def at(self, number: int, i: int, j: int, names: Iterable[str] = ()) -> dict[str, float]:
         """The numbers of a state at values i and j of x and y, all or some by name; what several states share stands for each."""
@@ -63,17 +79,18 @@ class DiagramNumbers:
 
         if missing:
             # In a thread of its own, since a notebook has a loop of events in this one.
-            with self._reading(), ThreadPoolExecutor(1) as pool:
+            with self._reading(f"point {i},{j}"), ThreadPoolExecutor(1) as pool:
                 known |= zip(missing, map(float, pool.submit(asyncio.run, read()).result()), strict=True)
         return {name: known[name] for name in names}
 
     @contextmanager
-    def _reading(self) -> Iterator[None]:
-        """Say in a line what is wrong with the parts of arrays."""
+    def _reading(self, part: str) -> Iterator[None]:
+        """Say in a line what is wrong with a part of the arrays."""
         with storage(self._path):
             try:
                 yield
             except (RuntimeError, ValueError) as error:
                 raise StoreError(
-                    f"{self._path}: numbers in it are damaged ({error}); restore it, or compute it again with another --out."
+                    f"{self._path}: numbers in it are damaged ({part}: {error}); restore it, or compute it again with "
+                    "another --out."
                 ) from None

@@ -119,6 +119,12 @@ class AbstractRecordStore(ABC, Generic[R]):
         return store
 
     @classmethod
+    def open_damaged(cls, path: str | Path) -> Self:
+        """A store to look at whatever has become of its records: `read` says which of them are damaged or missing."""
+        manifest, numbers = cls._read_manifest(Path(path)), cls._numbers(Path(path))
+        return cls(Path(path), manifest, max([manifest[cls.folder] or 0, *(one + 1 for one in numbers)]), None)
+
+    @classmethod
     def _reopen(cls, path: Path, scenario: Scenario) -> Self:
         """A store to continue, with every record checked; `scenario` is written with the next record."""
         with storage(path):
@@ -350,9 +356,7 @@ class AbstractRecordStore(ABC, Generic[R]):
     @classmethod
     def _count_records(cls, path: Path) -> int:
         """The number of records. StoreError where one in between is missing."""
-        with storage(path):
-            names = [entry.name for entry in (path / cls.folder).iterdir()]
-        numbers = sorted(int(name[:-4]) for name in names if re.fullmatch(r"\d{6,}\.npz", name))
+        numbers = cls._numbers(path)
         for expected, number in enumerate(numbers):
             if number != expected:
                 raise StoreError(
@@ -360,6 +364,12 @@ class AbstractRecordStore(ABC, Generic[R]):
                     f"it, or delete the later ones and resume the {cls.noun} with --resume."
                 )
         return len(numbers)
+
+    @classmethod
+    def _numbers(cls, path: Path) -> list[int]:
+        with storage(path):
+            names = [entry.name for entry in (path / cls.folder).iterdir()]
+        return sorted(int(name[:-4]) for name in names if re.fullmatch(r"\d{6,}\.npz", name))
 
 
 def noun_of(path: str | Path) -> str | None:

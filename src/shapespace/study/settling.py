@@ -16,6 +16,7 @@ from shapespace.base.outcome import Outcome
 from shapespace.base.problem import REST
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, state_of
+from shapespace.study.frame import Frame
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.keys import MAIN_KEYS, MODELS
 from shapespace.study.paths import NEWTON
@@ -40,6 +41,15 @@ def settle(scenario: Scenario, state: State, keys: tuple[str, ...] = ()) -> Stat
     problem = KeyedProblem.of(scenario, keys)
     base, x = Engine.of(scenario).placed(state)
     return solve_stationary(replace(problem, base=base), x, key_values(scenario, keys), NEWTON)
+
+
+def as_it_is(scenario: Scenario, frame: Frame) -> Stationary:
+    """A stored solution of the scenario on its own mesh, without a search."""
+    problem = KeyedProblem.of(scenario, (MAIN_KEYS[scenario.kind],))
+    problem = replace(problem, base=problem.base.on_mesh(frame.mesh))
+    x, p = problem.base.pack(state_of(frame)), key_values(scenario, problem.keys)
+    residual = float(np.abs(problem.residual(x, p, REST)).max())
+    return Stationary(problem, x, p, Outcome.CONVERGED, 0.0, residual, 0, settled=True)
 
 
 def settle_near(scenario: Scenario, start: Start) -> tuple[Stationary, str]:

@@ -25,7 +25,7 @@ from shapespace.study.paths import StateName, read_state_name
 from shapespace.study.presenting import Presented, Summary, quantities_table
 from shapespace.study.scenario import Scenario
 from shapespace.study.sensitivities import Sensitivities
-from shapespace.study.settling import settle, settle_near
+from shapespace.study.settling import as_it_is, settle, settle_near
 from shapespace.study.spectra import spectrum_at
 from shapespace.study.starts import Start, find_start
 
@@ -210,11 +210,17 @@ def steady_of(scenario: Scenario, found: Stationary, detail: str = "") -> Steady
     return Steady(scenario, found.problem, found, detail)
 
 
-def modes_near(scenario: Scenario, frame: Frame, count: int = 6) -> Modes:
-    """Leading modes of a stored state at rest, settled anew. InputError where it does not rest at these parameters."""
+def settled(scenario: Scenario, frame: Frame) -> Frame:
+    """The state of rest that a surface has come close to. InputError where there is none."""
     found = steady_of(scenario, settle(scenario, state_of(frame)))
     if not found.outcome.is_success:
         raise InputError(f"this state does not rest at its parameters ({found.outcome}): {found.outcome.advice}")
+    return found.frame
+
+
+def modes_at(scenario: Scenario, frame: Frame, count: int = 6) -> Modes:
+    """Leading modes of a stored solution, at the state as it is: Newton's method loses a fold or a branch point."""
+    found = steady_of(scenario, as_it_is(scenario, frame))
     spectrum = found.spectrum(count)
     if not spectrum.outcome.is_success:
         raise InputError(f"its growth rates are not known ({spectrum.outcome}): {spectrum.outcome.advice}")

@@ -13,6 +13,8 @@ import xarray as xr
 from matplotlib.colors import Colormap, LinearSegmentedColormap
 from matplotlib.mathtext import MathTextParser
 
+from shapespace.base.units import with_micro
+
 WIDTH_MM = 180.0
 MM = 1 / 25.4  # inches
 
@@ -134,9 +136,8 @@ def math_units(units: str) -> str:
         text = f"\\{name}" if is_greek else name if index else rf"\mathrm{{{name}}}"
         return text + (f"_{{{_greek(index)}}}" if index else "") + (f"^{{{match['power']}}}" if match["power"] else "")
 
-    # Mathtext drops blanks; micro is written u in files.
-    apart = re.sub(r"(?<=\w) (?=\w)", "*", units.replace("**", "^").replace("µ", "μ"))
-    apart = re.sub(r"(?<![A-Za-z])u(?=(?:m|s|g|N|M|J|Pa|l|L|mol)(?![A-Za-z]))", "μ", apart)
+    # Mathtext drops blanks.
+    apart = re.sub(r"(?<=\w) (?=\w)", "*", with_micro(units))
     text = "$" + _UNIT_TOKEN.sub(token, apart) + "$"
     return text if _is_math(text) else units.replace("$", "")
 

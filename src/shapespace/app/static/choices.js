@@ -2,6 +2,13 @@
 
 import { plain } from "./words.js";
 
+/** Put other lists in place of those in an element; the one that the keyboard is at stays so. */
+export function refill(host, ...parts) {
+  const { id } = host.contains(document.activeElement) ? document.activeElement : {};
+  host.replaceChildren(...parts);
+  if (id) document.getElementById(id)?.focus();
+}
+
 /** A list whose choice is told to `chosen`. options: names, or [value, words]. */
 export function choice(words, options, value, chosen, { swatch, id } = {}) {
   const label = document.createElement("label");

@@ -23,7 +23,7 @@ export async function ask(name, asked = {}) {
   }
   const isAnswer = response.headers.get("Content-Type")?.startsWith("application/json");
   const answer = isAnswer ? await response.json() : { error: await response.text() };
-  if (!response.ok) throw new Error(answer.error);
+  if (answer.error !== undefined) throw new Error(answer.error);
   return decoded(answer);
 }
 

@@ -1,23 +1,16 @@
 // States of a run, a branch, a curve or a search as a line or as points in a plane of two of their numbers.
 
 import { Chart } from "./chart.js";
-import { choice } from "./choices.js";
+import { choice, refill } from "./choices.js";
 import { place as placeLabels } from "./labels.js";
+import { mark } from "./marks.js";
 import { session } from "./session.js";
 import { limits, make } from "./svg.js";
 import { hideTip, showTip } from "./tip.js";
 import { view } from "./view.js";
-import { escaped, html, number, safe } from "./words.js";
+import { escaped, html, number, plain, safe, stabilityWords } from "./words.js";
 
 const REACH = 40;
-const MARKS = {
-  fold: "M-4 -4H4V4H-4Z", pitchfork: "M0 -5.5L5.5 0L0 5.5L-5.5 0Z", transcritical: "M0 -5.5L5.5 0L0 5.5L-5.5 0Z",
-  "branch-point": "M0 -5.5L5.5 0L0 5.5L-5.5 0Z", "fold-pitchfork": "M0 -5.5L5.5 0L0 5.5L-5.5 0Z",
-  "degenerate-pitchfork": "M0 -5.5L5.5 0L0 5.5L-5.5 0Z", cusp: "M0 -5L5 4H-5Z", turn: "M-4 -4H4V4H-4Z",
-  hopf: "M4.5 0A4.5 4.5 0 1 1 -4.5 0A4.5 4.5 0 1 1 4.5 0Z", "bogdanov-takens": "M4.5 0A4.5 4.5 0 1 1 -4.5 0A4.5 4.5 0 1 1 4.5 0Z",
-  state: "M5 0A5 5 0 1 1 -5 0A5 5 0 1 1 5 0Z", user: "M-2 -7H2V7H-2Z", end: "M2.5 0A2.5 2.5 0 1 1 -2.5 0A2.5 2.5 0 1 1 2.5 0Z",
-};
-const CROSS = "M-4 -6L0 -2L4 -6L6 -4L2 0L6 4L4 6L0 2L-4 6L-6 4L-2 0L-6 -4Z";
 
 export class Diagram extends Chart {
   constructor(host, tools, legend) {
@@ -38,14 +31,14 @@ export class Diagram extends Chart {
   }
 
   get names() {
-    const { columns } = this.table;
-    return { x: view.get("x") in columns ? view.get("x") : this.table.x, y: view.get("y") in columns ? view.get("y") : this.table.y };
+    const known = (axis) => (Object.hasOwn(this.table.columns, view.get(axis)) ? view.get(axis) : this.table[axis]);
+    return { x: known("x"), y: known("y") };
   }
 
   arrange() {
     const options = Object.keys(this.table.columns);
     const { x, y } = this.names;
-    this.tools.replaceChildren(
+    refill(this.tools,
       choice("up", options, y, (name) => view.set({ y: name }), { id: "choose-y" }),
       choice("across", options, x, (name) => view.set({ x: name }), { id: "choose-x" }),
     );
@@ -67,9 +60,11 @@ export class Diagram extends Chart {
     this.say("");
     const { x, y } = this.names;
     const [xs, ys] = [columns[x], columns[y]];
+    const [across, up] = [session.quantity(x), session.quantity(y)];
     const layer = this.axes({
-      width, height, whole: x === "state", x: limits(xs.filter(Number.isFinite)), y: limits(ys.filter(Number.isFinite), 0.08),
-      xTitle: { name: x, ...session.quantity(x) }, yTitle: { name: y, ...session.quantity(y) },
+      width, height, whole: x === "state",
+      x: limits(xs.filter(Number.isFinite), 0.05, across.least), y: limits(ys.filter(Number.isFinite), 0.08, up.least),
+      xTitle: { name: x, ...across }, yTitle: { name: y, ...up },
     });
     this.lines(layer, xs, ys);
     this.specials(layer, xs, ys);
@@ -99,17 +94,18 @@ export class Diagram extends Chart {
   }
 
   specials(layer, xs, ys) {
-    const { labels, kinds } = this.table;
+    const { labels, kinds, unstable, line } = this.table;
     if (!labels) return;
-    const wanted = [];
+    const [wanted, unnamed] = [[], []];
     labels.forEach((label, i) => {
       if (!label || !Number.isFinite(xs[i]) || !Number.isFinite(ys[i])) return;
       const [px, py] = [this.x(xs[i]), this.y(ys[i])];
-      layer.append(make("path", { class: "special", d: MARKS[kinds[i]] ?? CROSS, transform: `translate(${px} ${py})` }));
-      if (kinds[i] !== "end") wanted.push({ text: label, x: px, y: py });
+      layer.append(mark(kinds[i], px, py, { label, more: line ? "" : kindOf(unstable[i]) }));
+      if (kinds[i] === "end") unnamed.push([px, py]);
+      else wanted.push({ text: label, x: px, y: py });
     });
     const drawn = Array.from(xs, (value, i) => [this.x(value), this.y(ys[i])]).filter((one) => one.every(Number.isFinite));
-    placeLabels(wanted, drawn, this.box, layer);
+    placeLabels(wanted, line ? [drawn] : [], this.box, this.overlay, unnamed);
   }
 
   mark() {
@@ -144,11 +140,11 @@ export class Diagram extends Chart {
       return;
     }
     const { x, y } = this.names;
-    const { columns, labels, unstable } = this.table;
+    const { columns, labels, unstable, marginal } = this.table;
     this.pointer.append(make("circle", { class: "near", cx: this.x(columns[x][i]), cy: this.y(columns[y][i]), r: 8 }));
     const told = [x, y].map((name) => `${safe(name)} ${number(columns[name][i])} ${html(unit(name))}`);
     const head = labels?.[i] ? `<b>${escaped(labels[i])}</b><br>` : "";
-    showTip(event, `${head}${told.join("<br>")}${unstable ? `<br>${stabilityWords(unstable[i])}` : ""}`);
+    showTip(event, `${head}${told.join("<br>")}${unstable ? `<br>${stabilityWords(unstable[i], marginal[i])}` : ""}`);
   }
 
   leave() {
@@ -157,11 +153,12 @@ export class Diagram extends Chart {
   }
 
   describe() {
-    const { segments, of } = this.table;
-    const known = new Set(segments?.map(kindOf) ?? []);
+    const { segments, of, line, unstable } = this.table;
+    const known = new Set((line ? segments ?? [] : unstable).map(kindOf));
     const words = { stable: "stable", unstable: "unstable", unknown: "stability not known" };
-    this.legend.replaceChildren(...Object.keys(words).filter((kind) => known.has(kind)).map((kind) => sample(kind, words[kind])));
-    if (of) this.legend.append(sample("stable", `${of}s`));
+    const samples = Object.keys(words).filter((kind) => known.has(kind)).map((kind) => sample(line ? lineOf(kind) : dotOf(kind), words[kind]));
+    this.legend.replaceChildren(...samples);
+    if (of) this.legend.append(sample(lineOf("stable"), `${plain(of)}s`));
   }
 }
 
@@ -174,14 +171,13 @@ function unit(name) {
   return text === "1" ? "" : text;
 }
 
-function sample(kind, words) {
-  const span = document.createElement("span");
-  const svg = make("svg", { viewBox: "0 0 26 10" }, make("path", { class: kind, d: "M0 5H26" }));
-  span.append(svg, words);
-  return span;
-}
+/** Drawings of 26 by 10 pixels for a legend. */
+const lineOf = (kind) => [make("path", { class: kind, d: "M0 5H26" })];
+const dotOf = (kind) => [mark("state", 13, 5, { more: kind })];
 
-export function stabilityWords(growing) {
-  if (growing === null || growing === undefined) return "stability not known";
-  return growing === 0 ? "stable" : `${growing} growing mode${growing === 1 ? "" : "s"}`;
+/** What a drawing means, for a legend. */
+export function sample(drawing, words) {
+  const span = document.createElement("span");
+  span.append(make("svg", { viewBox: "0 0 26 10", "aria-hidden": "true" }, ...drawing), words);
+  return span;
 }

@@ -21,7 +21,7 @@ export async function copy(text, words) {
     await navigator.clipboard.writeText(text);
     say(words);
   } catch {
-    open(`<h3>${escaped(words)}</h3><p>This browser does not let a page copy; take it from here.</p><pre>${escaped(text)}</pre>`);
+    open(words, `<p>This browser does not let a page copy; take it from here.</p><pre>${escaped(text)}</pre>`);
   }
 }
 
@@ -35,10 +35,8 @@ export function copyLink() {
 
 export function showCommands() {
   if (!session.state?.commands) return;
-  open(`<h3>Continue from ${escaped(session.state.title)}</h3>
-    <p>Commands for a terminal. Each begins at this very state and writes to a new folder.</p>`);
-  session.state.commands.forEach((command, k) => dialog.insertBefore(entry(command, k), dialog.lastElementChild));
-  dialog.querySelector("button")?.focus();
+  open(`Continue from ${session.state.title}`, "<p>Commands for a terminal. Each begins at this very state and writes to a new folder.</p>");
+  dialog.append(...session.state.commands.map(entry));
 }
 
 const MEANINGS = {
@@ -47,7 +45,7 @@ const MEANINGS = {
 };
 
 /** A command with its choices, written anew as they change. */
-function entry(command, k) {
+function entry(command) {
   const part = document.createElement("section");
   const isOpen = command.keys !== undefined;
   part.innerHTML = `<h3>${command.name}: ${MEANINGS[command.name]}</h3>
@@ -57,7 +55,7 @@ function entry(command, k) {
     if (!isOpen) return command.text;
     return command.text.replace("{vary}", part.querySelector("select").value).replace("{stop}", part.querySelector("input").value);
   };
-  const write = () => { part.querySelector("pre").textContent = text(); };
+  const write = () => { part.querySelector("pre").replaceChildren(...wrapped(text())); };
   if (isOpen) {
     const select = part.querySelector("select");
     for (const key of command.keys) select.add(new Option(key, key, false, key === command.vary));
@@ -69,16 +67,31 @@ function entry(command, k) {
   return part;
 }
 
+/** A command whose lines break between words, not within an option. */
+function wrapped(text) {
+  return text.split(/(\s+)/).map((word) => {
+    if (!word.startsWith("-")) return word;
+    const option = document.createElement("span");
+    option.className = "option";
+    option.textContent = word;
+    return option;
+  });
+}
+
 export function showHelp(keys) {
   const rows = keys.map(({ shown, words }) => `<tr><td>${shown.map((key) => `<kbd>${key}</kbd>`).join(" ")}</td><td>${words}</td></tr>`);
   const { overview } = session;
   const about = overview ? `<p>${escaped(overview.path)}<br>${escaped(overview.scenario)}, ${escaped(overview.noun)}, made ${escaped(overview.created)} by shapespace ${escaped(overview.version)}: ${escaped(overview.outcome ?? "unfinished")}. ${escaped(overview.advice)}</p>` : "";
   const values = overview ? Object.entries(overview.parameters).map(([key, value]) => `${escaped(key)} = ${number(value)}`).join(", ") : "";
-  open(`<h3>This store</h3>${about}<p>${values}</p><h3>Keys</h3><table>${rows.join("")}</table>
-    <p>Drag the surface to turn it, scroll or pinch to come nearer, double-click to go back. Click a growth rate to see its mode.</p>`);
+  open("Help", `<h3>This store</h3>${about}<p>${values}</p>
+    <h3>The surface</h3><p>Drag it to turn it, scroll or pinch to come nearer, double-click to go back; or, when the keyboard is at it,
+    <kbd>←</kbd> <kbd>→</kbd> <kbd>↑</kbd> <kbd>↓</kbd> turn it, <kbd>+</kbd> and <kbd>−</kbd> change the distance and <kbd>Home</kbd> goes back.
+    Click a growth rate to see its mode.</p><h3>Keys elsewhere</h3><table>${rows.join("")}</table>`);
 }
 
-function open(content) {
-  dialog.innerHTML = `${content}<form method="dialog" class="end"><button>Close</button></form>`;
+/** The head stays in sight, with the first button there is, so that the keyboard begins at the top. */
+function open(title, content) {
+  dialog.innerHTML = `<form method="dialog" class="head"><h2 id="dialog-title">${escaped(title)}</h2><button>Close</button></form>${content}`;
   if (!dialog.open) dialog.showModal();
+  dialog.scrollTop = 0;
 }

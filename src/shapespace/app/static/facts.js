@@ -1,8 +1,7 @@
 // The numbers of a state.
 
-import { stabilityWords } from "./diagram.js";
 import { session } from "./session.js";
-import { escaped, html, number, safe } from "./words.js";
+import { escaped, html, number, safe, stabilityWords } from "./words.js";
 
 export function showFacts(host) {
   const { state } = session;
@@ -12,12 +11,12 @@ export function showFacts(host) {
   }
   const { observables, parameters = {}, missing } = state;
   const told = Object.entries(parameters).map(([name, value]) => `<span>${safe(name)} <b data-name="${escaped(name)}" data-value="${Number(value)}" style="font-size:13px">${number(value, 7)}</b></span>`);
-  const time = state.time === undefined ? "" : `<span>time <b data-name="time" data-value="${Number(state.time)}" style="font-size:13px">${number(state.time)}</b> ${unitOf("time")}</span>`;
+  const time = state.time === undefined || state.time === null ? "" : `<span>time <b data-name="time" data-value="${Number(state.time)}" style="font-size:13px">${number(state.time)}</b> ${unitOf("time")}</span>`;
   const head = `<p class="title"><b>${escaped(state.title)}</b>${badge(state)}${time}${told.join("")}</p>`;
   const none = missing ? `<p>${escaped(missing[0].replaceAll("-", " "))}. ${escaped(missing[1])}</p>` : "";
   const rows = Object.entries(observables).filter(([name]) => name !== "time").map(([name, value]) => {
     const { symbol, meaning } = session.quantity(name);
-    return `<div title="${escaped(meaning)}"><dt>${safe(name)} <i>${html(symbol)}</i></dt>`
+    return `<div title="${escaped(meaning)}"><dt><span>${safe(name)}</span> <i>${html(symbol)}</i></dt>`
       + `<dd data-name="${escaped(name)}" data-value="${Number(value)}">${number(value)} <small>${unitOf(name)}</small></dd></div>`;
   });
   host.innerHTML = `${head}${none}<dl>${rows.join("")}</dl>`;
@@ -28,9 +27,8 @@ function unitOf(name) {
   return unit === "1" ? "" : html(unit);
 }
 
-function badge(state) {
-  const isKnown = state.unstable !== undefined && state.unstable !== null;
-  if (state.missing || (!isKnown && !state.rates)) return "";
-  const kind = isKnown ? (state.unstable ? "growing" : "") : "unknown";
-  return isKnown ? `<span class="badge ${kind}">${stabilityWords(state.unstable)}</span>` : "";
+function badge({ missing, unstable, rates }) {
+  if (missing || unstable === undefined || unstable === null) return "";
+  const words = stabilityWords(unstable, rates?.marginal);
+  return `<span class="badge ${unstable ? "growing" : rates?.marginal ? "unknown" : ""}">${words}</span>`;
 }

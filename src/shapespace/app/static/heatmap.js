@@ -1,19 +1,21 @@
 // A diagram as colours over the plane of two keys, with its boundaries drawn over.
 
 import { Chart } from "./chart.js";
-import { choice } from "./choices.js";
-import { gradient, MAPS, row, scaleFor, table } from "./colours.js";
+import { choice, refill } from "./choices.js";
+import { colourOf, gradient, MAPS, row, scaleFor, table } from "./colours.js";
 import { recall } from "./data.js";
-import { stabilityWords } from "./diagram.js";
-import { place as placeLabels } from "./labels.js";
-import { placeOf, session } from "./session.js";
+import { sample } from "./diagram.js";
+import { dense, place as placeLabels } from "./labels.js";
+import { mark } from "./marks.js";
+import { layerOf, placeOf, session } from "./session.js";
 import { make } from "./svg.js";
 import { hideTip, showTip } from "./tip.js";
 import { view } from "./view.js";
-import { escaped, html, number, safe } from "./words.js";
+import { escaped, html, number, plain, safe, stabilityWords } from "./words.js";
 
 const IS_STATE = 1;
 const NOT_COMPUTED = 0;
+const NEAR = 6;
 
 /** Red, green, blue and opacity of a value, from 0 to 255. */
 function tableColours(scale) {
@@ -69,7 +71,7 @@ export class Heatmap extends Chart {
   }
 
   get layer() {
-    return Math.min(Number(view.get("state")) || 0, this.map.states.length - 1);
+    return layerOf(this.map);
   }
 
   async arrange() {
@@ -79,12 +81,14 @@ export class Heatmap extends Chart {
       const states = map.states.map((state, i) => [String(i), state]);
       tools.push(choice("state", states, String(this.layer), (state) => this.changeState(state), { id: "choose-state" }));
     }
-    tools.push(choice("as", ["auto", ...MAPS], view.get("mapcolours"), (chosen) => view.set({ mapcolours: chosen })));
-    this.tools.replaceChildren(...tools);
+    tools.push(choice("as", ["auto", ...MAPS], view.get("mapcolours"), (chosen) => view.set({ mapcolours: chosen }), { id: "choose-mapcolours" }));
+    refill(this.tools, ...tools);
     const wanted = name;
     await session.attempt("", async () => {
-      const { values, kinds } = await recall("values", { store: view.get("store"), name });
-      if (this.map && wanted === this.name) Object.assign(this, { values, kinds });
+      const { values, kinds, damage } = await recall("values", { store: view.get("store"), name });
+      if (!this.map || wanted !== this.name) return;
+      Object.assign(this, { values, kinds });
+      session.addDamage(damage);
     });
     this.due();
   }
@@ -102,7 +106,7 @@ export class Heatmap extends Chart {
     const [xs, ys] = [x.values, y.values];
     this.half = [(xs[1] - xs[0]) / 2, (ys[1] - ys[0]) / 2];
     const layer = this.axes({
-      width, height,
+      width, height, beyond: 1,
       x: [xs[0] - this.half[0], xs.at(-1) + this.half[0]], y: [ys[0] - this.half[1], ys.at(-1) + this.half[1]],
       xTitle: { name: x.key, ...session.quantity(x.key) }, yTitle: { name: y.key, ...session.quantity(y.key) },
     });
@@ -130,8 +134,9 @@ export class Heatmap extends Chart {
       if (value < low) low = value;
       if (value > high) high = value;
     }
-    const scale = scaleFor(low, high, view.get("mapcolours"), this.name);
-    const colourOf = this.kinds ? kindColours(this.kinds) : tableColours(scale);
+    const { least } = session.quantity(this.name);
+    const scale = low <= high ? scaleFor(low, high, view.get("mapcolours"), { name: this.name, least }) : null;
+    const coloured = this.kinds ? kindColours(this.kinds) : scale && tableColours(scale);
     const image = new ImageData(nx, ny);
     const hatch = document.documentElement.dataset.theme === "dark" ? [62, 70, 82] : [214, 213, 207];
     for (let j = 0; j < ny; j++) {
@@ -139,7 +144,7 @@ export class Heatmap extends Chart {
         const k = j * nx + i;
         const to = 4 * ((ny - 1 - j) * nx + i);
         if (Number.isFinite(values[k])) {
-          image.data.set(colourOf(values[k]), to);
+          image.data.set(coloured(values[k]), to);
           image.data[to + 3] = 255;
         } else if (codes[k] !== NOT_COMPUTED) {
           for (let c = 0; c < 3; c++) image.data[to + c] = hatch[c];
@@ -148,18 +153,18 @@ export class Heatmap extends Chart {
       }
     }
     this.canvas.getContext("2d").putImageData(image, 0, 0);
-    this.describe(scale, codes);
+    this.describe(scale, codes, values);
   }
 
-  describe(scale, codes) {
-    const { symbol, unit } = session.quantity(this.name);
-    const bar = document.createElement("span");
-    bar.innerHTML = `<b>${safe(this.name)} ${html(symbol)}</b> <b>${number(scale.low, 4)}</b>`
-      + `<i class="bar" style="background:${gradient(scale)}"></i><b>${number(scale.high, 4)} ${unit === "1" ? "" : html(unit)}</b>`;
-    this.legend.replaceChildren(...(this.kinds ? this.kinds.map(sampleOf) : [bar]));
-    if (codes.some((code) => code !== IS_STATE && code !== NOT_COMPUTED)) {
+  describe(scale, codes, values) {
+    this.legend.replaceChildren(...(this.kinds ? this.kinds.map(sampleOf) : scale ? [this.bar(scale)] : []));
+    const lacking = [
+      codes.some((code) => code !== IS_STATE && code !== NOT_COMPUTED) && "no state",
+      codes.some((code, k) => code === IS_STATE && !Number.isFinite(values[k])) && `no ${plain(this.name)}`,
+    ].filter(Boolean);
+    if (lacking.length) {
       const none = document.createElement("span");
-      none.innerHTML = '<i class="bar none"></i> no state';
+      none.innerHTML = `<i class="bar none"></i> ${escaped(lacking.join(" or "))}`;
       this.legend.append(none);
     }
     if (codes.some((code) => code === NOT_COMPUTED)) {
@@ -169,22 +174,43 @@ export class Heatmap extends Chart {
     }
   }
 
+  bar(scale) {
+    const { symbol, unit } = session.quantity(this.name);
+    const units = unit === "1" ? "" : html(unit);
+    const bar = document.createElement("span");
+    const range = scale.all === null
+      ? `<b>${number(scale.low, 4)}</b><i class="bar" style="background:${gradient(scale)}"></i><b>${number(scale.high, 4)} ${units}</b>`
+      : `<i class="bar kind" style="background:${colourOf(scale.all, scale)}"></i><b>${number(scale.all, 4)} ${units} everywhere</b>`;
+    bar.innerHTML = `<b>${safe(this.name)} ${html(symbol)}</b> ${range}`;
+    return bar;
+  }
+
   boundaries(layer) {
-    const wanted = [];
-    const drawn = [];
-    for (const { of, x: first, y: second, keys, labels } of this.map.boundaries ?? []) {
+    const named = [];
+    this.lines = (this.map.boundaries ?? []).map(({ of, x: first, y: second, keys, labels }) => {
       const isTurned = keys[0] === this.map.y.key;
       const [x, y] = isTurned ? [second, first] : [first, second];
-      // A rim in the colour of the page, as the line must show on every colour of the map.
+      // Dark on a pale rim in both themes, as the colours of a map are the same in both.
       layer.append(this.path(x, y, { class: "boundary rim" }), this.path(x, y, { class: `boundary ${of}` }));
-      for (let k = 0; k < x.length; k++) drawn.push([this.x(x[k]), this.y(y[k])]);
-      for (const [text, a, b] of labels) {
-        const [px, py] = isTurned ? [this.x(b), this.y(a)] : [this.x(a), this.y(b)];
-        layer.append(make("circle", { class: "special", cx: px, cy: py, r: 4 }));
-        wanted.push({ text, x: px, y: py });
-      }
+      for (const [text, kind, a, b] of labels) named.push({ text, kind, x: this.x(isTurned ? b : a), y: this.y(isTurned ? a : b) });
+      return { of, points: Array.from(x, (value, k) => [this.x(value), this.y(y[k])]) };
+    });
+    // Curves may go beyond the map.
+    const { left, right, top, bottom } = this.box;
+    const wanted = named.filter(({ x, y }) => x >= left - 1 && x <= right + 1 && y >= top - 1 && y <= bottom + 1);
+    for (const { text, kind, x, y } of wanted) layer.append(mark(kind, x, y, { label: text }));
+    placeLabels(wanted, this.lines.map(({ points }) => points), this.box, this.overlay);
+    for (const of of new Set(this.lines.map((line) => line.of))) {
+      const drawing = ["rim", of].map((kind) => make("path", { class: `boundary ${kind}`, d: "M0 5H26" }));
+      this.legend.append(sample(drawing, `${plain(of)}s`));
     }
-    placeLabels(wanted, drawn, this.box, layer);
+  }
+
+  /** What a boundary under the pointer consists of; empty where there is none. */
+  boundaryAt(event) {
+    const { left, top } = this.host.getBoundingClientRect();
+    const isNear = ([x, y]) => Math.hypot(x - event.clientX + left, y - event.clientY + top) < NEAR;
+    return this.lines.find(({ points }) => dense(points).some(isNear))?.of ?? "";
   }
 
   mark() {
@@ -226,7 +252,9 @@ export class Heatmap extends Chart {
       : kind ? `<b>${escaped(kind[1])}</b>`
       : isCount ? `<b>${stabilityWords(Number.isFinite(this.values[k]) ? this.values[k] : null)}</b>`
       : `<b>${safe(this.name)} ${number(this.values[k])}</b> ${unit === "1" ? "" : html(unit)}`;
-    showTip(event, `${value}<br>${safe(x.key)} ${number(x.values[i])}<br>${safe(y.key)} ${number(y.values[j])}`);
+    const boundary = this.boundaryAt(event);
+    const crossed = boundary ? `<br>boundary: ${safe(boundary)}s` : "";
+    showTip(event, `${value}<br>${safe(x.key)} ${number(x.values[i])}<br>${safe(y.key)} ${number(y.values[j])}${crossed}`);
   }
 
   leave() {

@@ -12,8 +12,8 @@ export function keysFor({ timeline, stage, changeTheme }) {
     { keys: ["ArrowLeft"], shown: ["←"], words: "state before; on a map, one to the left", act: () => step(-1, 0) },
     { keys: ["ArrowUp"], shown: ["↑"], words: "on a map, one up", act: () => step(0, 1), isMap: true },
     { keys: ["ArrowDown"], shown: ["↓"], words: "on a map, one down", act: () => step(0, -1), isMap: true },
-    { keys: ["Home"], shown: ["Home"], words: "first state", act: () => ends(0) },
-    { keys: ["End"], shown: ["End"], words: "last state", act: () => ends(-1) },
+    { keys: ["Home"], shown: ["Home"], words: "first state; on a map, first of its row", act: () => ends(0) },
+    { keys: ["End"], shown: ["End"], words: "last state; on a map, last of its row", act: () => ends(-1) },
     { keys: ["n", "]"], shown: ["n"], words: "next labelled point", act: () => labelled(1) },
     { keys: ["b", "["], shown: ["b"], words: "labelled point before", act: () => labelled(-1) },
     { keys: [" "], shown: ["space"], words: "play or pause a run; stop or start a mode", act: () => (timeline.isRun ? timeline.toggle() : swing(0)) },
@@ -45,19 +45,22 @@ export function listen(keys) {
 function step(across, up) {
   const { map } = session.overview;
   const { places } = session;
+  if (!session.state) return;
   if (map) {
     const [state, i, j] = session.state.place.split(",").map(Number);
     const held = (value, count) => Math.max(0, Math.min(count - 1, value));
     const [far, high] = isFile ? map.strides : [1, 1];
     session.choose(placeOf(map, state, held(i + far * across, map.x.values.length), held(j + high * up, map.y.values.length)));
-  } else if (session.state) {
+  } else {
     const i = places.indexOf(session.state.place) + across;
     if (i >= 0 && i < places.length) session.choose(places[i]);
   }
 }
 
 function ends(at) {
-  const place = session.places.at(at);
+  const { map } = session.overview;
+  const [state, , j] = map && session.state ? session.state.place.split(",").map(Number) : [];
+  const place = map ? placeOf(map, state, at && map.x.values.length - 1, j) : session.places.at(at);
   if (place !== undefined) session.choose(place);
 }
 
@@ -80,5 +83,5 @@ function next(stage) {
 }
 
 function nextStore() {
-  if (session.stores.length > 1) view.set({ store: (Number(view.get("store")) + 1) % session.stores.length, place: "", mode: "" });
+  if (session.stores.length > 1) view.changeStore((Number(view.get("store")) + 1) % session.stores.length);
 }

@@ -10,7 +10,7 @@ import { Spectrum } from "./spectrum.js";
 import { Stage } from "./stage.js";
 import { Timeline } from "./timeline.js";
 import { view } from "./view.js";
-import { plain } from "./words.js";
+import { damageWords, plain } from "./words.js";
 
 const element = (id) => document.getElementById(id);
 const places = ["diagram", "diagram-tools", "legend"].map(element);
@@ -42,8 +42,7 @@ session.on("overview", () => {
   diagram.svg.style.display = isMap ? "none" : "";
   heatmap.svg.style.display = isMap ? "" : "none";
   (isMap ? heatmap : diagram).arrange();
-  const keys = isMap ? `${plain(overview.map.x.key)} and ${plain(overview.map.y.key)}` : plain(overview.table.x);
-  element("about").textContent = `${overview.scenario}: ${overview.noun}${overview.noun === "run" || overview.noun === "search" ? "" : ` in ${keys}`}, ${overview.outcome ?? "unfinished"}`;
+  element("about").textContent = plain(overview.words);
   document.title = `${overview.name} · shapespace`;
 });
 session.on("closed", () => {
@@ -57,18 +56,13 @@ session.on("state", () => {
   for (const id of ["continue", "python"]) element(id).disabled = !session.state.python;
 });
 session.on("trouble", () => {
-  element("trouble").textContent = session.trouble;
-  element("trouble").hidden = session.trouble === "";
+  const told = [session.trouble, ...damageWords([...session.damage])].filter(Boolean);
+  element("trouble").textContent = told.join("\n");
+  element("trouble").hidden = !told.length;
 });
 
-element("store").addEventListener("change", () => view.set({ store: element("store").value, place: "", mode: "", x: "", y: "", of: "", state: "0" }));
-view.on(["store"], () => {
-  element("store").value = view.get("store");
-  session.openStore();
-});
-view.on(["place"], () => {
-  if (session.overview && view.get("place") && view.get("place") !== session.wanted) session.choose(view.get("place"));
-});
+element("store").addEventListener("change", () => view.changeStore(element("store").value));
+view.on(["store"], () => { element("store").value = view.get("store"); });
 view.on(["theme"], showTheme);
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", showTheme);
 

@@ -1,6 +1,12 @@
-// Turning the view by pointer, wheel and pinch.
+// Turning the view by pointer, wheel, pinch and keys.
 
 const START = { azimuth: 0.6, elevation: 0.32, zoom: 1 };
+const TURN = 0.12;
+const CLOSER = 1.15;
+const KEYS = {
+  ArrowLeft: [TURN, 0, 1], ArrowRight: [-TURN, 0, 1], ArrowUp: [0, TURN, 1], ArrowDown: [0, -TURN, 1],
+  "+": [0, 0, CLOSER], "=": [0, 0, CLOSER], "-": [0, 0, 1 / CLOSER],
+};
 
 export class Orbit {
   constructor(host, changed) {
@@ -17,6 +23,20 @@ export class Orbit {
       this.turn(0, 0, Math.exp(-0.0012 * event.deltaY));
     }, { passive: false });
     host.addEventListener("dblclick", () => this.home());
+    host.addEventListener("keydown", (event) => this.press(event));
+  }
+
+  get isHeld() {
+    return this.pointers.size > 0;
+  }
+
+  press(event) {
+    const turn = KEYS[event.key];
+    if (event.ctrlKey || event.metaKey || event.altKey || (!turn && event.key !== "Home")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    if (turn) this.turn(...turn);
+    else this.home();
   }
 
   move(event) {
@@ -56,12 +76,15 @@ export class Orbit {
     camera.lookAt(0, 0, 0);
   }
 
+  /** The view in numbers; empty for that at first. */
   text() {
-    return [this.azimuth, this.elevation, this.zoom].map((one) => one.toFixed(3)).join(",");
+    const [told, first] = [this, START].map((one) => [one.azimuth, one.elevation, one.zoom].map((value) => value.toFixed(3)).join(","));
+    return told === first ? "" : told;
   }
 
   read(text) {
-    const values = text.split(",").map(Number);
-    if (values.length === 3 && values.every(Number.isFinite)) [this.azimuth, this.elevation, this.zoom] = values;
+    if (text === this.text()) return;
+    [this.azimuth, this.elevation, this.zoom] = text ? text.split(",").map(Number) : Object.values(START);
+    this.turn(0, 0, 1);
   }
 }

@@ -7,6 +7,7 @@ import { limits, make } from "./svg.js";
 export class Outline extends Chart {
   constructor(host, pointed) {
     super(host, "Outline of the surface");
+    this.pointed = null;
     host.addEventListener("pointermove", (event) => this.moment && this.x && pointed(this.nearest(event)));
     host.addEventListener("pointerleave", () => pointed(null));
   }
@@ -35,9 +36,11 @@ export class Outline extends Chart {
     }
     this.dots = make("g");
     layer.append(this.dots);
+    this.point(this.pointed);
   }
 
   point(i) {
+    this.pointed = i;
     if (!this.dots || !this.moment) return;
     const { r, z } = this.moment;
     const dot = (side) => make("circle", { class: "here", r: 4, cx: this.x(side * r[i]), cy: this.y(z[i]) });

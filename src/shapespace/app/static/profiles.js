@@ -1,21 +1,19 @@
 // Two fields along the curve, from the upper pole to the lower one or the rim.
 
-import { Chart } from "./chart.js";
-import { choice } from "./choices.js";
+import { Chart, marginFor } from "./chart.js";
+import { choice, refill } from "./choices.js";
 import { session } from "./session.js";
-import { limits, linear, make, tick, ticks, title } from "./svg.js";
+import { limits, linear, make, title } from "./svg.js";
 import { hideTip, showTip } from "./tip.js";
 import { view } from "./view.js";
 import { html, number, safe } from "./words.js";
 
 const SECOND = { concentration: "tangential_velocity", local_spontaneous_curvature: "meridional_curvature" };
 
-const ROUND_OFF = 1e-9;
-
 export class Profiles extends Chart {
   constructor(host, tools, pointed) {
     super(host, "Profiles along the curve");
-    this.tools = tools;
+    Object.assign(this, { tools, pointed: null });
     host.addEventListener("pointermove", (event) => {
       const i = this.moment ? this.nearest(event) : null;
       pointed(i);
@@ -54,7 +52,7 @@ export class Profiles extends Chart {
 
   arrange() {
     if (!this.moment) return;
-    this.tools.replaceChildren(
+    refill(this.tools,
       choice("First profile", this.names, this.first, (first) => view.set({ first }), { swatch: "var(--accent)", id: "choose-first" }),
       choice("Second profile", [...this.names, "none"], this.second ?? "none", (second) => view.set({ second }), { swatch: "var(--warm)", id: "choose-second" }),
     );
@@ -69,24 +67,23 @@ export class Profiles extends Chart {
     this.say("");
     const { u, fields } = this.moment;
     const { first, second } = this;
-    const told = session.quantity(first);
+    const [told, other] = [first, second].map((name) => session.quantity(name ?? ""));
+    const range = (name) => limits(fields[name], 0.08, session.quantity(name).least);
+    const marks = second ? this.marks(range(second), height) : [];
     const layer = this.axes({
-      width, height, x: [0, 1], y: profileLimits(fields[first]), right: second ? 34 : 0, left: 44,
+      width, height, x: [0, 1], y: range(first), right: second ? Math.max(20, marginFor(marks) - 12) : 0, left: 44,
       xTitle: { name: "", symbol: "u", unit: "1" }, yTitle: { name: "", symbol: told.symbol, unit: told.unit },
     });
-    if (second) this.drawSecond(layer, u, fields[second], session.quantity(second));
+    if (second) this.drawSecond(layer, u, fields[second], linear(range(second), [this.box.bottom, this.box.top]), marks, other, width);
     layer.append(this.path(u, fields[first], { class: "first" }));
     this.line = make("g");
     this.overlay.append(this.line);
+    this.point(this.pointed);
   }
 
-  drawSecond(layer, u, values, { symbol, unit }) {
-    const scale = linear(profileLimits(values), [this.box.bottom, this.box.top]);
-    const marks = ticks(scale.domain, Math.min(5, (this.box.bottom - this.box.top) / 40));
-    for (const value of marks) {
-      this.overlay.append(make("text", { x: this.box.right + 6, y: scale(value) + 4, class: "warm" }, tick(value, marks[1] - marks[0] || 1)));
-    }
-    this.overlay.append(title("", { symbol, unit }, { x: this.box.right + 40, y: 14, "text-anchor": "end", class: "warm" }));
+  drawSecond(layer, u, values, scale, marks, { symbol, unit }, width) {
+    for (const [value, text] of marks) this.overlay.append(make("text", { x: this.box.right + 6, y: scale(value) + 4, class: "warm" }, text));
+    this.overlay.append(title("", { symbol, unit }, { x: width - 8, y: 14, "text-anchor": "end", class: "warm" }));
     const y = this.y;
     this.y = scale;
     layer.append(this.path(u, values, { class: "second" }));
@@ -113,13 +110,9 @@ export class Profiles extends Chart {
   }
 
   point(i) {
+    this.pointed = i;
     if (!this.line || !this.moment) return;
-    const at = i === null ? null : this.x(this.moment.u[i]);
+    const at = this.x(this.moment.u[i]);
     this.line.replaceChildren(...(i === null ? [] : [make("line", { class: "cross", x1: at, x2: at, y1: this.box.top, y2: this.box.bottom })]));
   }
-}
-
-/** Limits around a field; one that is nothing but round-off is drawn flat. */
-function profileLimits(values) {
-  return values.every((value) => Math.abs(value) < ROUND_OFF) ? [-1, 1] : limits(values, 0.08);
 }

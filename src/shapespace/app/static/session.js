@@ -9,7 +9,9 @@ export const session = new (class extends EventTarget {
   state = null;
   mode = null;
   trouble = "";
+  damage = new Set();
   doing = [];
+  opened = 0;
   asked = 0;
   wanted = "";
 
@@ -21,10 +23,10 @@ export const session = new (class extends EventTarget {
     this.addEventListener(name, (event) => listener(event.detail));
   }
 
-  /** Quantity of a name: symbol, meaning, unit. */
+  /** Quantity of a name: symbol, meaning, unit, and the least change that is drawn as one. */
   quantity(name) {
-    const [symbol, meaning, unit] = this.overview?.quantities[name] ?? ["", name.replaceAll("_", " "), "1"];
-    return { symbol, meaning, unit };
+    const [symbol, meaning, unit, least] = this.overview?.quantities[name] ?? ["", name.replaceAll("_", " "), "1", 0];
+    return { symbol, meaning, unit, least };
   }
 
   /** Places of all states in their order; of a map none. */
@@ -35,29 +37,49 @@ export const session = new (class extends EventTarget {
   async open() {
     await Promise.all([this.openStore(), this.attempt("", async () => {
       this.stores = (await ask("stores")).stores;
+      if (!(Number(view.get("store")) < this.stores.length)) view.changeStore("0");
       this.tell("stores");
     })]);
   }
 
+  /** Show the store that is looked at; one that is opened later wins. */
   async openStore() {
+    const number = ++this.opened;
+    this.asked++;
     forget();
-    Object.assign(this, { overview: null, state: null, mode: null });
+    Object.assign(this, { overview: null, state: null, mode: null, wanted: "", trouble: "", damage: new Set() });
     this.tell("closed");
     await this.attempt("reading the store", async () => {
-      this.overview = await ask("overview", { store: view.get("store") });
+      const overview = await ask("overview", { store: view.get("store") });
+      if (number !== this.opened) return;
+      this.overview = overview;
+      this.addDamage(overview.damage);
       this.tell("overview");
-      const place = view.get("place") || firstPlace(this.overview);
-      if (place) await this.choose(place);
+      await this.follow();
     });
+  }
+
+  /** Show the state and the mode that the address names; the first state where it names none. */
+  async follow() {
+    if (!this.overview) return;
+    const place = knownPlace(this.overview, view.get("place")) || firstPlace(this.overview);
+    const mode = view.get("mode");
+    if (place && place !== this.wanted) await this.choose(place);
+    else if (mode === "" && this.mode) this.stopMode();
+    else if (mode !== "" && this.state?.fields && !this.state.isComing && this.mode?.index !== Number(mode)) await this.animate(Number(mode));
   }
 
   /** Show the state at a place; one that is asked for later wins. */
   async choose(place) {
     const number = ++this.asked;
-    this.wanted = place;
     const store = view.get("store");
-    if (this.mode || (view.get("mode") && place !== view.get("place") && this.state)) this.stopMode();
-    view.set({ place });
+    this.wanted = place;
+    if (this.mode) {
+      this.mode = null;
+      this.tell("mode");
+    }
+    // A mode belongs to its state: only an address names both.
+    view.set(this.state && place !== view.get("place") ? { place, mode: "" } : { place });
     await this.attempt("", async () => {
       // A shape that must be computed is asked for at once, and its numbers are there before it.
       if (hasShape(this.overview, place)) recall("shape", { store, place }).catch(() => {});
@@ -68,6 +90,10 @@ export const session = new (class extends EventTarget {
       this.tell("state");
       if (settled.isComing) await this.shape(number, store, place, state);
       if (view.get("mode") && !this.mode && this.state.fields) await this.animate(Number(view.get("mode")));
+    }, (error) => {
+      if (number !== this.asked) return;
+      this.state = { place, title: "not readable", observables: {}, missing: ["not-readable", error.message] };
+      this.tell("state");
     });
   }
 
@@ -91,21 +117,25 @@ export const session = new (class extends EventTarget {
     await this.attempt("computing growth rates …", async () => {
       const rates = await recall("spectrum", { store: view.get("store"), place: state.place });
       if (state !== this.state) return;
-      this.state = { ...state, rates };
+      this.state = { ...state, rates, unstable: state.unstable ?? rates.unstable };
       this.tell("state");
     });
   }
 
   /** Set the surface swinging along a mode. */
   async animate(index) {
-    const { state } = this;
+    const { state, opened } = this;
+    if (state.rates ? !(index < state.rates.values.length) : !state.can_compute) {
+      view.set({ mode: "" });
+      return;
+    }
     await this.attempt(state.can_compute ? "computing the mode …" : "", async () => {
       const mode = await recall("mode", { store: view.get("store"), place: state.place, index });
-      if (state.place !== this.state?.place) return;
+      if (opened !== this.opened || state.place !== this.state?.place) return;
       this.mode = mode;
       view.set({ mode: index });
       this.tell("mode");
-    });
+    }, () => view.set({ mode: "" }));
   }
 
   stopMode() {
@@ -114,17 +144,26 @@ export const session = new (class extends EventTarget {
     this.tell("mode");
   }
 
+  /** What cannot be read of the store is told as long as it is open. */
+  addDamage(damage) {
+    for (const one of damage) this.damage.add(one);
+    this.tell("trouble");
+  }
+
   /** Do something that may fail, and say so until something else is tried. Words say what is waited for. */
   async attempt(words, act, failed) {
     if (!this.doing.length) this.trouble = "";
-    const one = { words };
+    const [one, { opened }] = [{ words }, this];
     this.doing.push(one);
     this.report();
     try {
       await act();
     } catch (error) {
-      this.trouble = error.message;
-      failed?.();
+      // What was asked of a store that is no longer looked at is of no interest.
+      if (opened === this.opened) {
+        this.trouble = error.message;
+        failed?.(error);
+      }
     } finally {
       this.doing.splice(this.doing.indexOf(one), 1);
       this.report();
@@ -142,11 +181,28 @@ export const session = new (class extends EventTarget {
   }
 })();
 
+// Before anybody else is told: what is drawn belongs to the store that is open.
+view.on(["store"], () => session.openStore());
+view.on(["place", "mode"], () => session.follow());
+
 /** Whether a place of a map has a state, whose shape the store does not hold. */
 function hasShape({ map }, place) {
   if (!map) return false;
   const [state, i, j] = place.split(",").map(Number);
   return map.outcomes[(state * map.y.values.length + j) * map.x.values.length + i] === 1;
+}
+
+/** A place that the store has, empty for others. */
+function knownPlace({ map, table }, place) {
+  if (!map) return table.places.includes(place) ? place : "";
+  const [numbers, counts] = [place.split(",").map(Number), [map.states.length, map.x.values.length, map.y.values.length]];
+  return /^\d+,\d+,\d+$/.test(place) && numbers.every((number, k) => number < counts[k]) ? placeOf(map, ...numbers) : "";
+}
+
+/** The number of the chosen state of a map. */
+export function layerOf(map) {
+  const number = Number(view.get("state"));
+  return number < map.states.length ? number : 0;
 }
 
 /** The place of a point of a map; in a file, of the nearest one that has its shape there. */
@@ -161,7 +217,7 @@ function firstPlace(overview) {
   if (overview.map) {
     const { x, y, outcomes } = overview.map;
     const [nx, ny] = [x.values.length, y.values.length];
-    const layer = Math.min(Number(view.get("state")) || 0, overview.map.states.length - 1);
+    const layer = layerOf(overview.map);
     let [nearest, at] = [Infinity, [0, 0]];
     for (let j = 0; j < ny; j++) {
       for (let i = 0; i < nx; i++) {

@@ -12,6 +12,9 @@ const REACH = 18;
 export class Spectrum extends Chart {
   constructor(host) {
     super(host, "Growth rates in the complex plane");
+    this.button = document.createElement("button");
+    Object.assign(this.button, { id: "compute", textContent: "Compute growth rates" });
+    this.button.addEventListener("click", () => session.waiting || session.compute());
     host.addEventListener("click", (event) => this.choose(this.nearest(event)));
     host.addEventListener("pointermove", (event) => this.hover(event));
     host.addEventListener("pointerleave", hideTip);
@@ -20,7 +23,17 @@ export class Spectrum extends Chart {
     session.on("waiting", () => this.due());
   }
 
+  /** The keyboard stays at the rate that it is at; from the button that computes them it goes to the first. */
   draw(width, height) {
+    const { activeElement } = document;
+    const index = this.host.contains(activeElement) ? activeElement.dataset.index ?? 0 : null;
+    this.fill(width, height);
+    if (index !== null && !this.host.contains(document.activeElement)) {
+      this.svg.querySelector(`[data-index="${index}"]`)?.focus({ preventScroll: true });
+    }
+  }
+
+  fill(width, height) {
     const rates = session.state?.rates;
     if (!rates?.values.length) {
       this.offer();
@@ -115,11 +128,7 @@ export class Spectrum extends Chart {
       this.say("Not in this file.");
       return;
     }
-    const button = document.createElement("button");
-    button.textContent = "Compute growth rates";
-    button.id = "compute";
-    button.disabled = session.waiting !== "";
-    button.addEventListener("click", () => session.compute());
-    this.say("Not stored for this state.", button);
+    this.button.setAttribute("aria-disabled", session.waiting !== "");
+    if (!this.message.contains(this.button)) this.say("Not stored for this state.", this.button);
   }
 }

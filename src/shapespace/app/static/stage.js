@@ -1,7 +1,7 @@
 // The surface with its tools, colours and scale, and the smaller drawings that follow it.
 
-import { choice, toggle } from "./choices.js";
-import { gradient, MAPS, scaleFor } from "./colours.js";
+import { choice, refill, toggle } from "./choices.js";
+import { colourOf, gradient, MAPS, scaleFor } from "./colours.js";
 import { momentOf, Swing, wordsOf } from "./motion.js";
 import { Outline } from "./outline.js";
 import { Profiles } from "./profiles.js";
@@ -12,7 +12,6 @@ import { escaped, html, number, safe } from "./words.js";
 const EXCESS = 1.25;
 const SHARE = 0.99;
 const NO_COLOUR = ["mesh_coordinate"];
-const REST = 1e-9;
 
 export class Stage {
   constructor() {
@@ -23,13 +22,15 @@ export class Stage {
     this.swing = new Swing((phase) => this.show(phase));
     session.on("closed", () => {
       this.surface?.reset();
-      this.swing.stop();
+      this.changed();
     });
     session.on("state", () => this.changed());
     session.on("mode", () => this.changed());
     for (const name of ["waiting", "mode"]) session.on(name, () => this.wait());
     view.on(["colour", "colours", "arrows"], () => this.changed());
-    view.on(["camera"], () => this.surface && view.get("camera") === "" && this.surface.orbit.home());
+    view.on(["camera"], () => this.surface?.orbit.read(view.get("camera")));
+    this.host.addEventListener("pointermove", (event) => this.surface && event.pointerType !== "touch" && pointed(this.surface.rowAt(event)));
+    this.host.addEventListener("pointerleave", () => pointed(null));
   }
 
   /** Three dimensions where the browser has them; the outline alone where it has not. */
@@ -74,7 +75,7 @@ export class Stage {
     const told = names.join() + colour + view.get("colours") + view.get("arrows");
     if (told === this.arranged) return;
     this.arranged = told;
-    this.tools.replaceChildren(
+    refill(this.tools,
       choice("colour", names, colour, (name) => view.set({ colour: name }), { id: "choose-colour" }),
       choice("as", ["auto", ...MAPS], view.get("colours"), (map) => view.set({ colours: map }), { id: "choose-colours" }),
       toggle("flow", view.get("arrows") === "1", (isOn) => view.set({ arrows: isOn ? "1" : "0" }), "choose-arrows"),
@@ -87,10 +88,11 @@ export class Stage {
     // What is drawn stays, paler, until the shape is there.
     if (state?.isComing && state.fields) return;
     if (!state?.fields) {
+      this.moment = null;
       this.outline.show(null);
       this.profiles.show(null);
-      if (this.surface) this.surface.skin.visible = false;
-      this.scale.replaceChildren();
+      this.surface?.hide();
+      this.describe(null);
       return;
     }
     const moment = momentOf(state, mode, phase);
@@ -102,15 +104,16 @@ export class Stage {
     const span = colour ? this.span(state.fields[colour], moment, colour) : null;
     const { tangential_velocity: tangential, normal_velocity: normal } = state.fields;
     const fastest = tangential && normal ? Math.max(...tangential.map((v, i) => Math.hypot(v, normal[i]))) : 0;
-    const isFlowing = view.get("arrows") === "1" && fastest > REST && !mode;
-    this.describe(span, colour, isFlowing ? fastest : 0);
+    const hasArrows = view.get("arrows") === "1" && !mode;
+    const isFlowing = hasArrows && fastest > session.overview.at_rest;
+    this.describe(span, colour, mode, isFlowing ? `longest arrow ${speedWords(fastest)}`
+      : hasArrows && tangential ? `at rest: no flow above ${speedWords(session.overview.at_rest)}` : "");
     if (!this.surface) return;
-    this.surface.skin.visible = true;
     const speed = state.velocity ?? 0;
     this.surface.show({
       r: moment.r, z: moment.z, angle: moment.angle, values, scale: span, fastest,
       flow: isFlowing ? { tangential, normal } : null,
-      speed: isFlowing && Math.abs(speed) > 1e-3 * fastest ? speed : 0,
+      speed: isFlowing && Math.abs(speed) > Math.max(session.overview.at_rest, 1e-3 * fastest) ? speed : 0,
       isOpen: session.overview.kind === "open-membrane",
     });
   }
@@ -131,28 +134,19 @@ export class Stage {
     const [low, high] = [values[order[0]], values[order.at(-1)]];
     const isBeyond = low >= 0 && high > EXCESS * top && top > low;
     const floor = low >= 0 && low < 0.5 * high ? 0 : low;
-    return { ...scaleFor(floor, isBeyond ? top : high, view.get("colours"), colour), isBeyond };
+    return { ...scaleFor(floor, isBeyond ? top : high, view.get("colours"), { name: colour, least: session.quantity(colour).least }), isBeyond };
   }
 
-  describe(span, colour, fastest) {
-    if (!span) {
-      this.scale.replaceChildren();
-      return;
-    }
-    const { symbol, unit } = session.quantity(colour);
-    const units = unit === "1" ? "" : html(unit);
-    const speed = session.quantity("tangential_velocity").unit;
-    const arrows = fastest ? `<span>longest arrow ${number(fastest, 3)} ${speed === "1" ? "" : html(speed)}</span>` : "";
-    const text = `${arrows}<span>${safe(colour)} ${html(symbol)}${units ? ` (${units})` : ""}</span>`
-      + `<span class="bar" style="background:${gradient(span)}"></span>`
-      + `<span class="ends"><span>${number(span.low, 3)}</span><span>${span.isBeyond ? "over " : ""}${number(span.high, 3)}</span></span>`;
+  describe(span, colour, mode, flow) {
+    const text = span ? scaleWords(span, colour, mode, flow) : "";
     if (text !== this.described) this.scale.innerHTML = text;
     this.described = text;
   }
 
   wait() {
     const { mode } = session;
-    const swinging = mode && session.state?.fields ? `swinging along mode ${mode.index + 1}${wordsOf(session.state, mode)}, drawn large; Esc stops` : "";
+    const stops = matchMedia("(pointer: coarse)").matches ? "tap the growth rate again to stop" : "Esc stops";
+    const swinging = mode && session.state?.fields ? `swinging along mode ${mode.index + 1}${wordsOf(session.state, mode)}, drawn large; ${stops}` : "";
     this.note.textContent = session.waiting || swinging;
     this.note.classList.toggle("waiting", session.waiting !== "");
     this.note.hidden = this.note.textContent === "";
@@ -163,4 +157,21 @@ export class Stage {
     this.profiles.point(i);
     this.surface?.point(this.moment ? i : null);
   }
+}
+
+function speedWords(speed) {
+  const { unit } = session.quantity("tangential_velocity");
+  return `${number(speed, 3)} ${unit === "1" ? "" : html(unit)}`;
+}
+
+/** What colours and arrows stand for. */
+function scaleWords(span, colour, mode, flow) {
+  const { symbol, unit } = session.quantity(colour);
+  const units = unit === "1" ? "" : html(unit);
+  const name = `${safe(colour)} ${html(symbol)}`;
+  const bar = span.all !== null && !mode
+    ? `${name} <span><i class="bar kind" style="background:${colourOf(span.all, span)}"></i><b>${number(span.all, 3)}</b> ${units} everywhere</span>`
+    : `${name}${units ? ` (${units})` : ""} <span><b>${number(span.low, 3)}</b><i class="bar" style="background:${gradient(span)}"></i>`
+      + `<b>${span.isBeyond ? "over " : ""}${number(span.high, 3)}</b></span>`;
+  return `<span>${flow}</span><span>${bar}</span>`;
 }

@@ -25,17 +25,24 @@ export class Surface {
     this.orbit = new Orbit(host, () => { this.due(); changed(this.orbit.text()); });
     this.extent = 0;
     this.centre = 0;
+    this.body = new three.Group();
+    this.body.visible = false;
+    this.scene.add(this.body);
     this.makeSkin();
     this.makeArrows();
     this.makeRings();
-    new ResizeObserver(() => this.due()).observe(host);
+    this.room = { width: 0, height: 0 };
+    new ResizeObserver(([{ contentRect }]) => {
+      this.room = contentRect;
+      this.due();
+    }).observe(host);
   }
 
   makeSkin() {
     const material = new three.MeshStandardMaterial({ vertexColors: true, roughness: 0.62, metalness: 0, side: three.DoubleSide });
     this.skin = new three.Mesh(new three.BufferGeometry(), material);
     this.skin.frustumCulled = false;
-    this.scene.add(this.skin);
+    this.body.add(this.skin);
     this.rows = 0;
   }
 
@@ -47,7 +54,7 @@ export class Surface {
     this.swim = [head, shaft].map((shape) => new three.Mesh(shape, new three.MeshStandardMaterial({ roughness: 0.5 })));
     for (const part of [...this.arrowParts, ...this.swim]) {
       part.frustumCulled = false;
-      this.scene.add(part);
+      this.body.add(part);
     }
   }
 
@@ -60,7 +67,7 @@ export class Surface {
     this.ring = new three.Line(shape, new three.LineBasicMaterial({ color: 0xc8501e }));
     this.rim = new three.Line(shape, new three.LineBasicMaterial({ color: 0x66707d }));
     this.ring.visible = this.rim.visible = false;
-    this.scene.add(this.ring, this.rim);
+    this.body.add(this.ring, this.rim);
   }
 
   setTheme(isDark) {
@@ -75,10 +82,17 @@ export class Surface {
     this.extent = 0;
   }
 
+  /** Show nothing. */
+  hide() {
+    this.body.visible = false;
+    this.due();
+  }
+
   /** Show a meridian: r, z, angle (m,), with values to colour, their scale, and velocities along and normal to it or null. */
   show({ r, z, angle, values, scale, flow, fastest, speed, isOpen }) {
     const rows = r.length;
     if (rows !== this.rows) this.makeMesh(rows);
+    this.body.visible = true;
     let [low, high, wide] = [Infinity, -Infinity, 0];
     for (let i = 0; i < rows; i++) {
       low = Math.min(low, z[i]);
@@ -179,6 +193,17 @@ export class Surface {
     }
   }
 
+  /** The row of the meridian under the pointer, null beside the surface. */
+  rowAt({ clientX, clientY }) {
+    if (!this.body.visible || this.orbit.isHeld) return null;
+    const { left, top, width, height } = this.host.getBoundingClientRect();
+    const ray = new three.Raycaster();
+    ray.setFromCamera(new three.Vector2((2 * (clientX - left)) / width - 1, 1 - (2 * (clientY - top)) / height), this.camera);
+    this.skin.geometry.computeBoundingSphere();
+    const [hit] = ray.intersectObject(this.skin);
+    return hit ? Math.floor(hit.faceIndex / (2 * AROUND)) : null;
+  }
+
   /** A ring around the surface at a row of the meridian; none for null. */
   point(i) {
     this.ring.visible = i !== null && this.meridian !== undefined;
@@ -200,9 +225,15 @@ export class Surface {
   }
 
   render() {
-    const { clientWidth: width, clientHeight: height } = this.host;
-    if (!width || !height || !this.extent) return;
-    this.renderer.setSize(width, height, false);
+    const { width, height } = this.room;
+    if (!width || !height) return;
+    if (this.room !== this.filled) this.renderer.setSize(width, height, false);
+    this.filled = this.room;
+    if (this.extent) this.placeCamera(width, height);
+    this.renderer.render(this.scene, this.camera);
+  }
+
+  placeCamera(width, height) {
     this.camera.aspect = width / height;
     const half = (this.camera.fov * Math.PI) / 360;
     const reach = (1.16 * this.extent) / Math.sin(Math.min(half, Math.atan(Math.tan(half) * this.camera.aspect)));
@@ -210,7 +241,6 @@ export class Surface {
     this.camera.near = 0.02 * reach;
     this.camera.far = 6 * reach;
     this.camera.updateProjectionMatrix();
-    this.renderer.render(this.scene, this.camera);
   }
 }
 

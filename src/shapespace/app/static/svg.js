@@ -12,6 +12,17 @@ export function make(name, attributes = {}, ...children) {
   return element;
 }
 
+let pen = null;
+
+/** How wide text is in a drawing, in pixels. */
+export function widthOf(text) {
+  if (!pen) {
+    pen = document.createElement("canvas").getContext("2d");
+    pen.font = `11px ${getComputedStyle(document.body).fontFamily}`;
+  }
+  return pen.measureText(text).width;
+}
+
 /** A linear map from [low, high] to [from, to], with its inverse. */
 export function linear([low, high], [from, to]) {
   const scale = (value) => from + ((value - low) / (high - low)) * (to - from);
@@ -30,17 +41,25 @@ export function ticks([low, high], count, least = 0) {
   return found;
 }
 
-/** Limits around values with some room, never of no width. */
-export function limits(values, room = 0.05) {
+const FLAT = 1e-6;
+
+/** The middle of values that are even but for round-off, null of others. least: the smallest change that is one. */
+export function evenValue(low, high, least = 0) {
+  const size = Math.max(Math.abs(low), Math.abs(high));
+  if (size <= least) return 0;
+  return high - low <= Math.max(least, FLAT * size) ? (low + high) / 2 : null;
+}
+
+/** Limits around values with some room; wide ones around those that are even. least: as above. */
+export function limits(values, room = 0.05, least = 0) {
   let [low, high] = [Infinity, -Infinity];
   for (const value of values) {
     if (value < low) low = value;
     if (value > high) high = value;
   }
   if (low > high) return [0, 1];
-  // What is even but for round-off is drawn as even.
-  const least = 1e-6 * Math.max(Math.abs(low), Math.abs(high)) || 1;
-  if (high - low < least) return [low - least * 10, high + least * 10];
+  const even = evenValue(low, high, least);
+  if (even !== null) return [even - (0.1 * Math.abs(even) || 1), even + (0.1 * Math.abs(even) || 1)];
   return [low - room * (high - low), high + room * (high - low)];
 }
 

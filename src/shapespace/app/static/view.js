@@ -1,28 +1,37 @@
 // What is looked at: plain values, kept in the address so that a link brings the same view back.
 
-const DEFAULTS = {
-  store: "0", place: "", x: "", y: "", of: "", state: "0", mapcolours: "auto",
-  colour: "", colours: "auto", arrows: "1", first: "", second: "", mode: "", camera: "", theme: "",
+import { MAPS } from "./colours.js";
+
+const NAME = /^\w*$/;
+const COUNT = /^\d{1,6}$/;
+const COLOURS = new RegExp(`^(auto|${MAPS.join("|")})$`);
+
+/** Of each value what it is at first, and what else it may be; whether a store has such a name or place is seen where it is used. */
+const KNOWN = {
+  store: ["0", COUNT], place: ["", /^[\d,]*$/], x: ["", NAME], y: ["", NAME], of: ["", NAME], state: ["0", COUNT], mapcolours: ["auto", COLOURS],
+  colour: ["", NAME], colours: ["auto", COLOURS], arrows: ["1", /^[01]$/], first: ["", NAME], second: ["", NAME],
+  mode: ["", /^\d$/], camera: ["", /^(-?\d+\.?\d*,){2}\d+\.?\d*$/], theme: ["", /^(light|dark)$/],
 };
+const OF_STORE = ["place", "mode", "x", "y", "of", "state"];
 
 class View {
   constructor() {
-    this.values = { ...DEFAULTS };
     this.listeners = [];
-    this.read();
+    this.values = this.read();
     addEventListener("hashchange", () => {
-      if (location.hash.slice(1) !== this.text()) {
-        this.read();
-        this.tell(Object.keys(DEFAULTS));
-      }
+      const before = this.values;
+      this.values = this.read();
+      this.tell(Object.keys(KNOWN).filter((name) => this.values[name] !== before[name]));
     });
   }
 
+  /** The values that the address has, and what they are at first where it has none that makes sense. */
   read() {
-    this.values = { ...DEFAULTS };
-    for (const [name, value] of new URLSearchParams(location.hash.slice(1))) {
-      if (name in DEFAULTS) this.values[name] = value;
-    }
+    const asked = new URLSearchParams(location.hash.slice(1));
+    return Object.fromEntries(Object.entries(KNOWN).map(([name, [first, known]]) => {
+      const value = asked.get(name);
+      return [name, value !== null && known.test(value) ? value : first];
+    }));
   }
 
   get(name) {
@@ -40,8 +49,13 @@ class View {
     this.tell(changed);
   }
 
+  /** Go to another store; what belongs to the one before is left there. */
+  changeStore(store) {
+    this.set({ ...Object.fromEntries(OF_STORE.map((name) => [name, KNOWN[name][0]])), store });
+  }
+
   text() {
-    const told = Object.entries(this.values).filter(([name, value]) => value !== DEFAULTS[name]);
+    const told = Object.entries(this.values).filter(([name, value]) => value !== KNOWN[name][0]);
     return new URLSearchParams(told).toString();
   }
 

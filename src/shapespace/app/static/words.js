@@ -40,7 +40,8 @@ export function number(value, digits = 6) {
   const text = size >= 1e6 || size < 1e-4 ? value.toExponential(Math.min(digits - 1, 3)) : value.toPrecision(digits);
   const [mantissa, power] = text.split("e");
   const short = mantissa.includes(".") ? mantissa.replace(/\.?0+$/, "") : mantissa;
-  return (power ? `${short}·10${raised(Number(power))}` : short).replace("-", "−");
+  const ten = power ? `10${raised(Number(power))}` : "";
+  return (ten && /^-?1$/.test(short) ? short.replace("1", ten) : [short, ten].filter(Boolean).join("·")).replace("-", "−");
 }
 
 function raised(power) {
@@ -57,3 +58,19 @@ export function safe(name) {
 }
 
 export const unitless = (unit) => !unit || unit === "1";
+
+const NAMED = 3;
+
+/** What cannot be read of a store that is shown without it, in lines. */
+export function damageWords(damage) {
+  if (!damage.length) return [];
+  const more = damage.length > NAMED ? [`and ${damage.length - NAMED} more.`] : [];
+  return [`Shown without what cannot be read of this store:`, ...damage.slice(0, NAMED), ...more];
+}
+
+/** Of a number of growing modes; marginal: stability changes here, as a rate vanishes within its error. */
+export function stabilityWords(growing, isMarginal = false) {
+  if (growing === null || growing === undefined) return "stability not known";
+  if (growing === 0) return isMarginal ? "marginal" : "stable";
+  return `${growing} growing mode${growing === 1 ? "" : "s"}${isMarginal ? ", one marginal" : ""}`;
+}
