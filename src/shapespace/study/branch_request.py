@@ -13,7 +13,8 @@ from shapespace.study.measures import make_observable
 from shapespace.study.scenario import Scenario
 
 FARTHEST = 10.0
-"""Of the way to the stop: how far a branch that leaves another one may lead the other way."""
+"""Times the way to the stop, or the key itself where that is larger: how far a branch that leaves another one may lead the other
+way before it turns."""
 
 
 @dataclass(frozen=True)
@@ -85,8 +86,9 @@ class Request:
     @property
     def bounds(self) -> tuple[float, ...]:
         """Values of the key at which the branch ends: the stop, and one for a branch that does not come there."""
-        reach = FARTHEST if self.side else 1.0 if self.both else 0.0
-        return tuple(dict.fromkeys((self.stop, self.start + reach * (self.start - self.stop))))
+        way = self.stop - self.start
+        reach = FARTHEST * max(abs(way), abs(self.start)) if self.side else abs(way) if self.both else 0.0
+        return tuple(dict.fromkeys((self.stop, self.start - reach * float(np.sign(way)))))
 
     def ending(self, value: float) -> Outcome:
         """How a branch ends that comes to a bound."""
