@@ -123,7 +123,7 @@ def test_a_branch_that_turns_back_says_so():
 
 def test_a_side_branch_that_leads_away_ends(sphere: Path):
     """Swimmers are beyond the pitchfork only: asked for below, the branch ends far on the other side."""
-    found = ss.branch(swimmer(), "peclet", 21.0, origin=f"{sphere}:pitchfork-1", side=1, stability=False)
+    found = ss.branch(swimmer(), "peclet", 2.0, origin=f"{sphere}:pitchfork-1", side=1, stability=False)
     assert found.outcome is Outcome.TURNED_BACK
     assert found["end-1"].parameter == pytest.approx(242.0, rel=1e-9)
 
