@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
@@ -26,7 +25,7 @@ from shapespace.view import style
 from shapespace.view.figure import plot_run
 from shapespace.view.outline import draw_outline
 
-COLOURS = (style.BLUE, style.ORANGE, style.PURPLE, style.GREEN, style.RED)
+COLOURS = style.LINES
 
 
 @dataclass(frozen=True)
@@ -144,8 +143,7 @@ def jump(
 
 def panels(columns: Sequence[float], height_mm: float = 80.0) -> tuple[Figure, list[Axes]]:
     """A figure of the page's width with axes side by side of these relative widths; inside `style.house_style()`."""
-    figure = Figure(figsize=(style.WIDTH_MM * style.MM, height_mm * style.MM), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.new_figure(1.0, height_mm)
     return figure, list(figure.subplots(1, len(columns), width_ratios=columns, squeeze=False)[0])
 
 

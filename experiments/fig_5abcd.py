@@ -18,8 +18,6 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 import shapespace as ss
 from common import Row, draw_starts, label, main, near, save
@@ -88,8 +86,7 @@ def check_points(found: ss.Diagram, places: tuple[tuple[int, int], ...]) -> list
 def draw(found: ss.Diagram, out: Path) -> None:
     """Speed and polarity with contours, and below shapes along R0/L_h = 5 and along Pe = 300."""
     with style.house_style():
-        figure = Figure(figsize=(style.WIDTH_MM * style.MM, 115.0 * style.MM), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = style.new_figure(1.0, 115.0)
         axes = figure.subplots(2, 2, height_ratios=(1.0, 0.5))
         data = found.dataset
         for place, name, words in zip(

@@ -24,9 +24,9 @@ from shapespace.view.snapshot import make_camera, make_surface
 
 CURVES = {
     "membrane-protrusion": ("height $d$ ($R_{b}$)", "growth speed ($R_{b}/\\tau$)"),
-    "ring-slipping": ("ring position $u_m$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
-    "polar-swimmer": ("polarity $P$", "swimming speed $v_0$ ($R_{0}/\\tau$)"),
-    "guided-division": ("neck radius $r_n$ ($R_{0}$)",),
+    "ring-slipping": ("ring position $u_m$", "velocity $v_0$ ($R_{0}/\\tau$)"),
+    "polar-swimmer": ("polarity $P$", "velocity $v_0$ ($R_{0}/\\tau$)"),
+    "guided-division": ("equator radius $r(1/2)$ ($R_{0}$)",),
 }
 
 
@@ -78,7 +78,7 @@ def test_figure_shows_curve_snapshots_and_panels(scenario: str) -> None:
     titles = [axes.get_title() for axes in figure.axes if "\\bf" in axes.get_title()]
     assert len(titles) == 5
     assert "0.00 $\\tau$" in titles[0]
-    assert ("regulator $c$ ($c_{0}$)" in labels) == (scenario != "membrane-protrusion")
+    assert ("concentration $c$ ($c_{0}$)" in labels) == (scenario != "membrane-protrusion")
     assert figure.get_figwidth() * 25.4 == pytest.approx(180)
 
 
@@ -146,8 +146,8 @@ def test_swimmer_has_a_green_arrow_along_its_velocity() -> None:
 def test_other_datasets_get_a_generic_layout() -> None:
     dataset = dataset_of("ring-slipping").assign_attrs(scenario="mine")
     labels = [axes.get_ylabel() for axes in plot_run(dataset).axes]
-    assert "equator radius $r_n$ ($R_{0}$)" in labels
-    assert "swimming speed $v_0$ ($R_{0}/\\tau$)" in labels
+    assert "equator radius $r(1/2)$ ($R_{0}$)" in labels
+    assert "velocity $v_0$ ($R_{0}/\\tau$)" in labels
     bare = dataset.drop_vars(["concentration", "velocity"]).assign_attrs(model="something else")
     for name in bare.variables:
         bare[name].attrs = {}
@@ -248,7 +248,7 @@ def test_units_are_typeset(stored: str, shown: str) -> None:
 def test_early_change_gets_a_logarithmic_time_axis() -> None:
     figure = plot_run(dying_flow())
     check_labels(figure)
-    assert figure.axes[0].get_xscale() == "symlog"
+    assert figure.axes[0].get_xscale() == "asinh"
     ticks = figure.axes[0].get_xticks()
     assert ticks[0] == 0
     assert len(ticks) > 3

@@ -47,6 +47,7 @@ def gibbs_loop() -> Iterator[Row]:
 def balances() -> Iterator[Row]:
     """A surface that begins to divide: enclosed volume, and energy against dissipation and power, over the run."""
     done = run(scenario("guided-division", until=0.05))
+    assert done.outcome is not None
     if not done.outcome.is_success:
         raise Absent(f"{done.outcome}: {done.outcome.advice}")
     frames = done.frames[1:]
