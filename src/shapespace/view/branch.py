@@ -39,7 +39,7 @@ def plot_branch(branch: Branch, observable: str | None = None) -> Figure:
         axes.set_ylim(*_range([point.observables[name] for point in known], branch.scenario.scales.factor(name)))
         axes.set_xlabel(style.quantity_label(branch.scenario.scales, branch.key))
         axes.set_ylabel(style.quantity_label(branch.scenario.scales, name))
-        axes.legend(handles=_legend(lines), loc="best")
+        axes.legend(handles=line_handles(lines), loc="best")
         label_points(axes, [(one.label, one.parameter, one.observables[name]) for one in specials if one.kind != "end"])
     return figure
 
@@ -108,10 +108,10 @@ def _draw_specials(axes: Axes, points: Sequence[BranchPoint], name: str) -> None
         axes.plot(point.parameter, point.observables[name], mark, color=style.RED, markersize=4.0, zorder=3)
 
 
-def _legend(lines: set[str]) -> list[Line2D]:
-    """What the lines mean, of those that are drawn."""
+def line_handles(lines: set[str], stable: str = style.BLUE) -> list[Line2D]:
+    """What the lines mean, for a legend, of those that were drawn. stable: colour of what is stable."""
     handles = [
-        Line2D([], [], color=style.BLUE, linestyle="-", label="stable"),
+        Line2D([], [], color=stable, linestyle="-", label="stable"),
         Line2D([], [], color=style.INK, linestyle="--", label="unstable"),
         Line2D([], [], color=style.INK, linestyle=":", label="stability not known"),
     ]

@@ -147,8 +147,8 @@ def units_of(variable: xr.DataArray) -> str:
 
 
 def words_of(name: str) -> str:
-    """The name of a quantity in words."""
-    return name.replace("_", " ")
+    """The name of a quantity in words, a name of a person as that."""
+    return "Péclet number" if name == "peclet" else name.replace("_", " ")
 
 
 def axis_label(variable: xr.DataArray) -> str:
