@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from functools import cache
-from itertools import combinations
 from pathlib import Path
 
 import matplotlib as mpl
@@ -12,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
 from matplotlib.text import Text
-from matplotlib.transforms import Bbox
+from tests.pages import assert_apart, assert_on_page, texts_of
 from tests.view.synthetic import FRAMES, MAKERS, dataset_of, dying_flow, guided_division
 
 from shapespace.base.errors import InputError
@@ -42,28 +41,6 @@ def arrows_of(figure: Figure) -> Iterator[tuple[Axes, Quiver]]:
         for artist in axes.collections:
             if isinstance(artist, Quiver):
                 yield axes, artist
-
-
-def texts_of(figure: Figure) -> list[Text]:
-    """Every text that is really drawn: tick labels outside the limits are not."""
-    found = []
-    for text in figure.findobj(Text):
-        if not (text.get_visible() and text.get_text().strip()):
-            continue
-        box = text.get_window_extent()
-        if box.width > 0 and np.isfinite(box.extents).all():
-            found.append(text)
-    drawn_ticks, all_ticks = set(), set()
-    for axes in figure.findobj(Axes):
-        for axis in (axes.xaxis, axes.yaxis):
-            low, high = sorted(axis.get_view_interval())
-            for tick in axis.get_major_ticks():
-                labels = {id(tick.label1), id(tick.label2)}
-                all_ticks |= labels
-                slack = 1e-9 * (high - low)
-                if axes.axison and axis.get_visible() and low - slack <= tick.get_loc() <= high + slack:
-                    drawn_ticks |= labels
-    return [text for text in found if id(text) in drawn_ticks or id(text) not in all_ticks]
 
 
 @pytest.mark.parametrize("scenario", MAKERS)
@@ -104,18 +81,9 @@ def test_arrows_are_there_and_inside_their_axes(scenario: str) -> None:
 
 
 def check_labels(figure: Figure) -> None:
-    figure.canvas.draw()
-    page = Bbox.from_bounds(0, 0, figure.bbox.width, figure.bbox.height).padded(0.5)
-    texts = texts_of(figure)
-    boxes = [text.get_window_extent().padded(-0.5) for text in texts]
-    for text, box in zip(texts, boxes, strict=True):
-        assert text.get_fontsize() >= 7, text
-        assert page.containsx(box.x0), text
-        assert page.containsx(box.x1), text
-        assert page.containsy(box.y0), text
-        assert page.containsy(box.y1), text
-    for (one, box), (other, other_box) in combinations(zip(texts, boxes, strict=True), 2):
-        assert not box.overlaps(other_box), f"{one.get_text()!r} over {other.get_text()!r}"
+    assert_on_page(figure)
+    assert_apart(figure)
+    assert [text for text in texts_of(figure) if text.get_fontsize() < 7] == []
 
 
 @pytest.mark.parametrize("scenario", MAKERS)

@@ -141,7 +141,7 @@ def _scale(name: str, values: np.ndarray, scale: float) -> tuple[Normalize, Colo
         return BoundaryNorm(np.arange(min(most, MOST_COUNTED) + 2) - 0.5, colours.N), colours
     least, most = not_magnified(least, most, scale)
     if least < 0.0 < most and min(-least, most) > 0.01 * max(-least, most):
-        return CenteredNorm(), style.signed_map()
+        return CenteredNorm(halfrange=max(-least, most)), style.signed_map()
     dark_end = style.regulator_map()
     return Normalize(least, most), dark_end if abs(most) >= abs(least) else dark_end.reversed()
 

@@ -126,7 +126,9 @@ class _Crowd:
         doubt = float(np.maximum(0.0, wanted - _distances(box, others)).sum())
         covered = np.count_nonzero(_distances(wide, self._spots) == 0.0)
         if lead is not None:
-            doubt += float(np.maximum(0.0, 2.0 * MARK - _from_segment(others, lead)).sum())
+            # No closer to another mark than its own one is anyway.
+            clear = np.minimum(2.0 * MARK, np.linalg.norm(others - mark, axis=1))
+            doubt += float(np.maximum(0.0, clear - _from_segment(others, lead)).sum())
             covered += np.count_nonzero(_from_segment(self._spots, lead) < SPOT)
         cost = FORBIDDEN * (off + over) + MISLEADING * doubt + covered + FAR * own
         horizontal, vertical = (int(side) for side in sides)
