@@ -74,15 +74,13 @@ def csv_of(data: xr.Dataset) -> str:
 def _write_meshes(data: xr.Dataset, folder: Path, form: str, progress: Progress) -> Path:
     units = {str(name): variable.attrs.get("units", "") for name, variable in data.variables.items()}
     series = _series(data)
-    numbers = [
-        name for name, one in data.data_vars.items() if len(one.dims) == 1 and np.issubdtype(one.dtype, np.floating)
-    ]
+    keys = ["time"] if "time" in data else _varied(data)
     carried = REGULATORS.get(data.attrs["kind"], "")
     span = (min(0.0, float(data[carried].min())), float(data[carried].max())) if carried in data else (0.0, 1.0)
     names = {f"{number:06d}.{'vtp' if form == 'vtk' else 'ply'}": float(value) for number, value in enumerate(series)}
     for number, (name, value) in enumerate(names.items()):
         mesh = mesh_of(data, number)
-        told = {str(name): float(data[name][number]) for name in numbers}
+        told = {key: float(data[key][number]) for key in keys}
         is_vtk = form == "vtk"
         content = vtk_bytes(mesh, units, value, told) if is_vtk else ply_bytes(mesh, data.attrs["kind"], span, told)
         write_atomically(folder / name, content)
@@ -93,11 +91,16 @@ def _write_meshes(data: xr.Dataset, folder: Path, form: str, progress: Progress)
     return folder / "series.pvd"
 
 
+def _varied(data: xr.Dataset) -> list[str]:
+    """The keys that vary from state to state."""
+    return str(data.attrs.get(VARIED, "")).split()
+
+
 def _series(data: xr.Dataset) -> NDArray[np.float64]:
     """What takes the place of time in a series: time, of states the key that varies where it does so steadily, else numbers."""
     if "time" in data:
         return np.asarray(data["time"].to_numpy(), dtype=np.float64)
-    for key in reversed(str(data.attrs.get(VARIED, "")).split()):
+    for key in reversed(_varied(data)):
         values = np.asarray(data[key].to_numpy(), dtype=np.float64)
         steps = np.diff(values)
         if (steps > 0.0).all() or (steps < 0.0).all():

@@ -78,8 +78,8 @@ def _triangles(rings: int, is_closed: bool) -> NDArray[np.int64]:
 
 
 def vtk_bytes(mesh: Mesh, units: Mapping[str, str], time: float, numbers: Mapping[str, float]) -> bytes:
-    """An XML PolyData file (.vtp), compressed: fields in single precision, time as TimeValue and numbers of the state as field
-    data in double precision, units as a comment.
+    """An XML PolyData file (.vtp), compressed: fields in single precision, time as TimeValue and numbers as field data in double
+    precision, units as a comment. numbers: time, or the state's values of the keys that vary.
     """
     told = ", ".join(f"{name} {unit}" for name, unit in units.items() if name in mesh.data or name in numbers)
     about = "".join(_number(name, value) for name, value in {"TimeValue": time, **numbers}.items())

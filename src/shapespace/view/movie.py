@@ -288,7 +288,8 @@ class Clock:
         span = least or 0.01 * float(np.abs(values).max()) or 1.0  # what two or more digits should show
         self._decimals = max(0, -int(np.floor(np.log10(span))))
         shared: dict[str, Any] = {"fontsize": size, "color": colour, "va": "baseline"}
-        left = still.text(_CLOCKS_LEFT, y, f"{style.symbol_of(variable)} = ", ha="left", **shared)
+        self.symbol = f"{style.symbol_of(variable)} = "
+        left = still.text(_CLOCKS_LEFT, y, self.symbol, ha="left", **shared)
         widest = max((style.fixed(float(v), self._decimals) for v in (values.min(), values.max())), key=len)
         probe = still.text(0, 0, widest, **shared)
         page = float(still.bbox.width)
