@@ -38,15 +38,16 @@ def own_models() -> Iterator[None]:
 
 @pytest.fixture
 def pages_checked(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every figure that a test writes to a file must have its texts on the page."""
+    """Every figure that a test writes to a file must have its texts on the page, and its legends beside its lines."""
     from matplotlib.figure import Figure
-    from tests.pages import assert_on_page
+    from tests.pages import assert_legends_clear, assert_on_page
 
     write = Figure.savefig
 
     def checked(figure: Figure, target: object, **options: object) -> None:
         if options.get("format") not in ("rgba", "raw"):  # frames of movies
             assert_on_page(figure)
+            assert_legends_clear(figure)
         write(figure, target, **options)
 
     monkeypatch.setattr(Figure, "savefig", checked)
