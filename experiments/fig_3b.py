@@ -122,7 +122,7 @@ def draw(branch: ss.Branch, runs: dict[str, ss.Run], loops: dict[str, list[dict[
             mark = {"marker": RAMP_MARKS[name], "ms": 3.0, "mfc": "none", "mew": 0.6, "linestyle": ""}
             right.plot([one[KEY] for one in reached], [one["height"] for one in reached], color=style.INK, **mark)
             handles.append(handle(f"ramp {name}", **mark))
-        right.legend(handles=handles, loc="lower right")
+        right.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
         right.set_xlim(6.0, 12.0)
         right.set_ylim(0.2, 0.8)
         right.set_xlabel(style.quantity_label(scales, KEY))

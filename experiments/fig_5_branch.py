@@ -118,7 +118,7 @@ def check_screening(across: ss.Branch) -> list[Row]:
 def draw(swimmers: dict[float, ss.Branch], across: ss.Branch | None, out: Path) -> None:
     """Speed and polarity along the branches, and some of the shapes."""
     with style.house_style():
-        figure, axes = panels((1.0, 1.0, *([] if across is None else [1.0]), 1.4), 65.0)
+        figure, axes = panels((1.0, 1.0, *([] if across is None else [1.25]), 1.75), 65.0)
         branch = swimmers[5.0]
         scales, drawn = branch.scenario.scales, set[str]()
         if across is not None:

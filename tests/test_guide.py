@@ -50,5 +50,9 @@ def test_what_is_refused_names_its_page(
 def test_the_page_is_named_as_it_is_seen_from_here(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(DOCS.parent)
     assert page_for(["verify"]) == Path("docs/how-to/verify.md")
-    assert page_for(["verify"], StoreError("x")) == Path("docs/file-format.md")
+    assert page_for(["run"], StoreError("x")) == Path("docs/file-format.md")
+    assert page_for(["explore"], StoreError("x")) == Path("docs/how-to/explore-in-the-browser.md")
+    refused = StoreError("x")
+    refused.__cause__ = PermissionError()
+    assert page_for(["run"], refused) == Path("docs/quickstart.md")
     assert page_for(["run", "-s", "a=1"], InputError("x")) == Path("docs/glossary.md")
