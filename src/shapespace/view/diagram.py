@@ -48,9 +48,10 @@ def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
     name = observable or _telling(diagram, data.where(is_state))
     if name not in names:
         raise InputError(f"{name}: is no observable of this diagram; choose one of {', '.join(names)}.")
-    has_states = "state" in data[name].dims
-    states = diagram.request.labels if has_states else ("",)
-    values = (data[name].where(is_state) if has_states else data[name]).transpose(..., y, x)
+    # What is told of all states at a point together has one map and no state that could be missing.
+    is_of_all = "state" in data[OUTCOME].dims and "state" not in data[name].dims
+    states = ("",) if is_of_all else diagram.request.labels
+    values = (data[name] if is_of_all else data[name].where(is_state)).transpose(..., y, x)
     maps = values.to_numpy().reshape(len(states), *values.shape[-2:])
     outcomes = data[OUTCOME].transpose(..., y, x).to_numpy().reshape(-1, *values.shape[-2:])
     scales = diagram.scenario.scales
@@ -60,7 +61,7 @@ def plot_diagram(diagram: Diagram, observable: str | None = None) -> Figure:
         panels = figure.subplots(1, len(maps), squeeze=False, sharey=True)[0]
         for axes, one, codes, state in zip(panels, maps, outcomes, states, strict=False):
             image = axes.pcolormesh(data[x], data[y], one, norm=norm, cmap=colours, rasterized=True)
-            if has_states:
+            if not is_of_all:
                 _mark_missing(axes, data[x].to_numpy(), data[y].to_numpy(), codes)
             draw_boundaries(axes, diagram)
             axes.set_xlabel(style.quantity_label(scales, x))

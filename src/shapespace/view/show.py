@@ -58,7 +58,7 @@ def film_of(source: Source | Branch) -> xr.Dataset:
     if isinstance(source, str | Path):
         noun = noun_of(source)
         if noun not in FILMED and (noun or not holds_store(source)):
-            what = f"holds a {noun}" if noun else "holds no result"
+            what = f"holds a {noun}" if noun else "holds no run or branch"
             raise InputError(
                 f"{source}: {what}; a movie shows a run or the states along a branch: give a directory that `shapespace run` or "
                 "`shapespace branch` made."
