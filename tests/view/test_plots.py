@@ -109,12 +109,16 @@ def test_a_stored_state_is_drawn_and_is_no_run(shell: Shell, tmp_path: Path):
     assert run.plot().get_suptitle() == "" or run.plot().axes
 
 
-def test_counts_of_states_are_drawn_in_steps(stores: Path):
+@pytest.mark.parametrize("is_of_all", [False, True])
+def test_counts_of_states_are_drawn_in_steps(stores: Path, is_of_all: bool):
     """Also where there is one map of all states, without a state for each."""
     diagram = ss.open_diagram(stores / "map")
     data = diagram.dataset.assign(n_states=(diagram.request.grid.keys[::-1], np.arange(16).reshape(4, 4) % 3))
+    if is_of_all:
+        data["outcome"] = data["outcome"].expand_dims(state=["state-1", "state-2"])
     diagram.__dict__["dataset"] = data
     figure = diagram.plot("n_states")
+    assert len(figure.axes) == 2
     assert [label.get_text() for label in figure.axes[-1].get_yticklabels()] == ["0", "1", "2"]
     assert figure.axes[-1].get_ylabel() == "states"
     assert_on_page(figure)
