@@ -32,7 +32,6 @@ test-slow: $(STAMP) ## the tests that take minutes
 	$(BIN)/python -m pytest -n $(JOBS) -m slow
 
 docs: $(STAMP) ## run every page of the documentation and build it in build/docs/html
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
 	$(BIN)/python -m sphinx -W --keep-going -b html docs build/docs/html
 
 format: $(STAMP) ## rewrite the sources in the common format and mend what lint can mend
@@ -56,6 +55,6 @@ $(STAMP): pyproject.toml constraints.txt
 	@if [ -f $@ ]; then rm $@; else $(PYTHON) -m venv --clear .venv; fi
 	@echo "Installing the pinned dependencies into .venv (a few minutes the first time) ..."
 	@PIP_CONSTRAINT=constraints.txt PIP_BUILD_CONSTRAINT=constraints.txt \
-	  $(BIN)/python -m pip install --quiet --quiet --no-compile --disable-pip-version-check -c constraints.txt -e '.[movie,dev]'
+	  $(BIN)/python -m pip install --quiet --quiet --no-compile --disable-pip-version-check -c constraints.txt -e '.[dev]'
 	@PYTHONDONTWRITEBYTECODE= $(BIN)/python -c 'import shapespace.cli, shapespace.study.simulation, shapespace.study.dataset, shapespace.view.movie'
 	@touch $@

@@ -73,6 +73,13 @@ def run_changed(app: Any) -> None:
         raise ExtensionError("\n".join(failures))
 
 
+def expect_no_pictures(app: Any, config: Any) -> None:
+    """Pages that are not run make no pictures."""
+    del app
+    if not config.run_pages:
+        config.suppress_warnings = [*config.suppress_warnings, "image.not_readable"]
+
+
 def plain_docstring(app: Any, what: str, name: str, of: Any, options: Any, lines: list[str]) -> None:
     """Docstrings are plain text with formulas: what reStructuredText would take for markup is escaped."""
     del app, what, name, of, options
@@ -82,5 +89,6 @@ def plain_docstring(app: Any, what: str, name: str, of: Any, options: Any, lines
 def setup(app: Any) -> None:
     """Called by Sphinx; `-D run_pages=0` builds the pages without running them."""
     app.add_config_value("run_pages", True, "env", bool)
+    app.connect("config-inited", expect_no_pictures)
     app.connect("builder-inited", run_changed)
     app.connect("autodoc-process-docstring", plain_docstring)

@@ -167,7 +167,7 @@ def draw(rest: "ss.Steady", flows: "dict[float, Array]", branches: "dict[float, 
     from shapespace.study.dataset import profile_of
     from shapespace.view import style
 
-    fields = profile_of(rest.scenario, rest.frame)
+    fields, scales = profile_of(rest.scenario, rest.frame), rest.scenario.scales
     with style.house_style():
         figure, (left, middle, right) = panels((0.7, 1.0, 1.0), 62.0)
         z, r, turn = fields["axial_position"], fields["radius"], fields["azimuthal_velocity"]
@@ -181,14 +181,14 @@ def draw(rest: "ss.Steady", flows: "dict[float, Array]", branches: "dict[float, 
         left.set_title("seen from the side")
         for (torque, flow), colour in zip(flows.items(), (style.BLUE, style.ORANGE), strict=True):
             middle.plot(fields["mesh_coordinate"], flow, color=colour, label=rf"$\tau$ = {torque:g}")
-        middle.set_xlabel("mesh coordinate $u$")
-        middle.set_ylabel(r"$v_\phi$ $(R_A/\tau)$")
+        middle.set_xlabel(style.quantity_label(scales, "mesh_coordinate"))
+        middle.set_ylabel(style.quantity_label(scales, "azimuthal_velocity"))
         middle.legend()
         for (zeta, branch), colour in zip(branches.items(), (style.BLUE, style.ORANGE), strict=True):
             points = [(point.parameter, point.observables["equator_radius"]) for point in branch.points]
             right.plot(*np.array(points).T, color=colour, label=rf"$\zeta$ = {zeta:g}")
-        right.set_xlabel("reduced volume $v$")
-        right.set_ylabel("waist radius $(R_A)$")
+        right.set_xlabel(style.quantity_label(scales, "reduced_volume"))
+        right.set_ylabel(style.quantity_label(scales, "equator_radius"))
         right.legend()
         save(figure, out, "chiral_cortex")
 

@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from rich.console import Console
 from rich.table import Table
 
 import shapespace as ss
-from shapespace.base.scales import QUANTITIES
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.dataset import profile_of
 from shapespace.study.starts import Start
@@ -26,14 +25,13 @@ from shapespace.view import style
 from shapespace.view.figure import plot_run
 from shapespace.view.outline import draw_outline
 
-COLOURS = (style.BLUE, style.ORANGE, style.PURPLE, style.GREEN, style.RED)
-
 
 @dataclass(frozen=True)
 class Row:
     """One claim. holds: what is asserted of our number, which is not agreement where the paper is wrong or silent.
 
-    verdict: agrees, differs, or not in the paper. error: of our number, as another discretisation or a law shows it.
+    verdict: agrees, differs, not in the paper, or in a word why it cannot be compared. error: of our number, as another
+    discretisation or a law shows it.
     """
 
     claim: str
@@ -144,14 +142,13 @@ def jump(
 
 def panels(columns: Sequence[float], height_mm: float = 80.0) -> tuple[Figure, list[Axes]]:
     """A figure of the page's width with axes side by side of these relative widths; inside `style.house_style()`."""
-    figure = Figure(figsize=(style.WIDTH_MM * style.MM, height_mm * style.MM), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.new_figure(1.0, height_mm)
     return figure, list(figure.subplots(1, len(columns), width_ratios=columns, squeeze=False)[0])
 
 
-def label(name: str, words: str = "") -> str:
-    """An axis label of a quantity."""
-    return f"{words or name.replace('_', ' ')} {style.math_symbol(QUANTITIES[name].symbol)}"
+def handle(text: str, colour: str = style.INK, **looks: Any) -> Line2D:
+    """An entry of a legend: a line, or with marker and linestyle="" a mark."""
+    return Line2D([], [], color=colour, label=text, **{"ms": 3.5, **looks})
 
 
 def draw_states(axes: Axes, branch: ss.Branch, points: Sequence[BranchPoint], names: Sequence[str]) -> None:

@@ -16,10 +16,10 @@ from there to C0 R_b = 11.756, where the neck closes: the limiting shape of the 
 from pathlib import Path
 
 import shapespace as ss
-from common import Row, draw_states, label, labelled, main, near, panels, resumed_branch, save
+from common import Row, draw_states, labelled, main, near, panels, resumed_branch, save
 from shapespace.study.branch_point import BranchPoint
 from shapespace.view import style
-from shapespace.view.branch import MARKS, draw_lines
+from shapespace.view.branch import MARKS, draw_lines, line_handles
 
 KEY = "spontaneous_curvature"
 SHOWN = 9.0
@@ -118,7 +118,9 @@ def draw(branch: ss.Branch, out: Path) -> None:
     """The loop, its end, and the three states at the dashed line."""
     with style.house_style():
         figure, (left, right) = panels((1.2, 1.0))
-        draw_lines(left, branch.points, "height", colour=style.BLUE)
+        left.legend(
+            handles=line_handles(draw_lines(left, branch.points, "height", colour=style.BLUE)), loc="upper left"
+        )
         for point in branch.special_points:
             if point.kind == "fold":
                 left.plot(point.parameter, point.observables["height"], MARKS["fold"], color=style.BLUE, ms=3.5)
@@ -130,8 +132,8 @@ def draw(branch: ss.Branch, out: Path) -> None:
         left.axvline(SHOWN, color=style.FAINT, linestyle="--", linewidth=0.8, zorder=0)
         for point, colour in zip(three_states(branch), (style.GREEN, style.FAINT, style.RED), strict=True):
             left.plot(point.parameter, point.observables["height"], "o", color=colour, ms=4, zorder=4)
-        left.set_xlabel(f"{label(KEY)} $(1/R_b)$")
-        left.set_ylabel(f"{label('height')} $(R_b)$")
+        left.set_xlabel(style.quantity_label(branch.scenario.scales, KEY))
+        left.set_ylabel(style.quantity_label(branch.scenario.scales, "height"))
         draw_states(right, branch, [*three_states(branch), end], ["no neck, stable", "unstable", "neck, stable", "bud"])
         right.set_title(r"states at $C_0 R_b = 9$, and where the neck closes")
         save(figure, out, "fig_3a")

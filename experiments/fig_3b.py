@@ -20,16 +20,17 @@ from pathlib import Path
 import numpy as np
 
 import shapespace as ss
-from common import Row, draw_starts, jump, label, labelled, main, near, panels, ramp, save
+from common import Row, draw_starts, handle, jump, labelled, main, near, panels, ramp, save
 from fig_3a import KEY, SHOWN, gibbs_loop, three_states
 from shapespace.study.starts import Start
 from shapespace.view import style
-from shapespace.view.branch import draw_lines
+from shapespace.view.branch import draw_lines, line_handles
 
 WITHOUT, WITH = 0.67, 0.65
 """The paper's initial heights without and with neck."""
 PULL = 2.0 * np.pi * 4.0
 RAMP_STEP = 0.02
+RAMP_MARKS = {"up": "^", "down": "v"}
 
 
 def run(out: Path, quick: bool) -> list[Row]:
@@ -105,27 +106,27 @@ def draw(branch: ss.Branch, runs: dict[str, ss.Run], loops: dict[str, list[dict[
     """Heights over time, the shapes at both ends, and the ramps beside the branch."""
     with style.house_style():
         figure, (left, middle, right) = panels((1.0, 1.1, 1.0), 65.0)
-        colours = (style.GREEN, style.BLUE)
+        colours, scales = (style.GREEN, style.BLUE), branch.scenario.scales
         for (name, found), colour in zip(runs.items(), colours, strict=True):
             data = found.dataset
             left.plot(data["time"][1:], data["height"][1:], color=colour, label=name)
             left.axhline(float(data["height"][0]), color=colour, linewidth=0.5, linestyle=":")
         left.set_xscale("log")
-        left.set_xlabel(r"time $t$ $(\tau)$")
-        left.set_ylabel(f"{label('height')} $(R_b)$")
+        left.set_xlabel(style.quantity_label(scales, "time"))
+        left.set_ylabel(style.quantity_label(scales, "height"))
         left.legend()
         states = [run.state(number) for run in runs.values() for number in (0, -1)]
         draw_starts(middle, states, ["start", "end", "start", "end"])
-        draw_lines(right, branch.points, "height", colour=style.BLUE)
-        for name, marker in (("up", "^"), ("down", "v")):
-            for one in loops.get(name, []):
-                right.plot(one[KEY], one["height"], marker, color=style.INK, ms=3.0, mfc="none", mew=0.6)
-        right.plot([], [], marker, color=style.INK, ms=3.0, mfc="none", mew=0.6, label=f"ramp {name}")
-        right.legend(loc="lower right")
+        handles = line_handles(draw_lines(right, branch.points, "height", colour=style.BLUE))
+        for name, reached in loops.items():
+            mark = {"marker": RAMP_MARKS[name], "ms": 3.0, "mfc": "none", "mew": 0.6, "linestyle": ""}
+            right.plot([one[KEY] for one in reached], [one["height"] for one in reached], color=style.INK, **mark)
+            handles.append(handle(f"ramp {name}", **mark))
+        right.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=2)
         right.set_xlim(6.0, 12.0)
         right.set_ylim(0.2, 0.8)
-        right.set_xlabel(f"{label(KEY)} $(1/R_b)$")
-        right.set_ylabel(f"{label('height')} $(R_b)$")
+        right.set_xlabel(style.quantity_label(scales, KEY))
+        right.set_ylabel(style.quantity_label(scales, "height"))
         save(figure, out, "fig_3b")
 
 

@@ -22,10 +22,10 @@ import numpy as np
 from matplotlib.axes import Axes
 
 import shapespace as ss
-from common import Row, label, labelled, main, near, panels, resumed_branch, save
+from common import Row, handle, labelled, main, near, panels, resumed_branch, save
 from fig_3a import gibbs_loop, three_states
 from shapespace.view import style
-from shapespace.view.branch import MARKS, draw_lines
+from shapespace.view.branch import MARKS, draw_lines, line_handles
 
 KEY, FORCE = "pulling_force", "pulling_force_per_2pi"
 PLATEAU = 5.0
@@ -134,22 +134,24 @@ def draw(branches: dict[str, ss.Branch], out: Path) -> None:
     with style.house_style():
         figure, (left, right) = panels((1.0, 1.2))
         colours = dict(zip(branches, (style.GREEN, style.BLUE, style.INK), strict=True))
+        drawn: set[str] = set()
         for name, branch in branches.items():
-            left.plot([], [], color=colours[name], label=name)
             for axes in (left, right):
-                draw_lines(axes, branch.points, "height", across=FORCE, colour=colours[name])
+                drawn |= draw_lines(axes, branch.points, "height", across=FORCE, colour=colours[name])
                 mark(axes, branch, colours[name])
         left.axvline(PLATEAU, color=style.FAINT, linewidth=0.8, zorder=0)
         left.axvline(0.0, color=style.FAINT, linestyle=":", linewidth=0.8, zorder=0)
         left.set_xlim(-1.0, 6.5)
         left.set_ylim(-0.1, 6.0)
-        left.legend(loc="upper left")
+        handles = [handle(name, colour) for name, colour in colours.items()] + line_handles(drawn, style.INK)
+        handles += [handle("fold", marker=MARKS["fold"], linestyle=""), handle("neck closes", marker="o", linestyle="")]
+        figure.legend(handles=handles, ncols=len(handles), loc="outside lower center")
         right.axvline(0.0, color=style.FAINT, linestyle=":", linewidth=0.8, zorder=0)
         right.set_xlim(-0.5, 1.4)
         right.set_ylim(0.25, 0.95)
         for axes in (left, right):
-            axes.set_xlabel(f"{label(FORCE, 'pulling force')} $(\\kappa/R_b)$")
-            axes.set_ylabel(f"{label('height')} $(R_b)$")
+            axes.set_xlabel(style.quantity_label(branch.scenario.scales, FORCE))
+            axes.set_ylabel(style.quantity_label(branch.scenario.scales, "height"))
         save(figure, out, "fig_3c")
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 import shapespace as ss
-from common import Row, draw_starts, label, labelled, main, near, panels, save
+from common import Row, draw_starts, labelled, main, near, panels, save
 from fig_3b import pulled_out
 from fig_3c import KEY, SHOWN, TURN, coated
 from shapespace.study.branch_point import BranchPoint
@@ -70,13 +70,14 @@ def draw(runs: dict[str, ss.Run], out: Path) -> None:
     with style.house_style():
         figure, (left, starts, ends) = panels((1.4, 1.0, 1.0), 80.0)
         colours = (style.GREEN, style.ORANGE, style.BLUE, style.PURPLE)
+        scales = next(iter(runs.values())).scenario.scales
         for (name, found), colour in zip(runs.items(), colours, strict=True):
             data = found.dataset
             left.plot(data["time"][1:], data["height"][1:], color=colour, label=name.replace("2pi", "2π"))
         left.set_xscale("log")
-        left.set_xlabel(r"time $t$ $(\tau)$")
-        left.set_ylabel(f"{label('height')} $(R_b)$")
-        left.legend()
+        left.set_xlabel(style.quantity_label(scales, "time"))
+        left.set_ylabel(style.quantity_label(scales, "height"))
+        left.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
         names = [name.replace("2pi", "2π") for name in runs]
         draw_starts(starts, [found.state(0) for found in runs.values()], names)
         draw_starts(ends, [found.state() for found in runs.values()], names)

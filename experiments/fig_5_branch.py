@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 
 import shapespace as ss
-from common import COLOURS, Row, draw_states, label, labelled, main, near, panels, resumed_branch, save
+from common import Row, draw_states, handle, labelled, main, near, panels, resumed_branch, save
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.dataset import profile_of
 from shapespace.view import style
-from shapespace.view.branch import MARKS, draw_lines
+from shapespace.view.branch import MARKS, draw_lines, line_handles
 
 PECLET, LENGTH = "peclet", "inverse_hydrodynamic_length"
 ONSET = 22.0
@@ -118,32 +118,36 @@ def check_screening(across: ss.Branch) -> list[Row]:
 def draw(swimmers: dict[float, ss.Branch], across: ss.Branch | None, out: Path) -> None:
     """Speed and polarity along the branches, and some of the shapes."""
     with style.house_style():
-        figure, axes = panels((1.0, 1.0, 1.0, 1.4), 65.0)
+        figure, axes = panels((1.0, 1.0, *([] if across is None else [1.25]), 1.75), 65.0)
+        branch = swimmers[5.0]
+        scales, drawn = branch.scenario.scales, set[str]()
         if across is not None:
             twin = axes[2].twinx()
             twin.spines["right"].set_visible(True)
             for place, name, colour in ((axes[2], "polarity", style.ORANGE), (twin, "velocity", style.GREEN)):
-                draw_lines(place, across.points, name, colour=colour)
-                place.set_ylabel(label(name), color=colour)
+                drawn |= draw_lines(place, across.points, name, colour=colour)
+                place.set_ylabel(style.quantity_label(scales, name), color=colour)
             twin.set_ylim(-40.0, 0.0)
             axes[2].set_ylim(0.0, 1.0)
-            axes[2].set_title("Pe = 300")
-        axes[2].set_xlabel(style.math_symbol("R0/L_h"))
-        for place, name in enumerate(("velocity", "polarity")):
-            for (length, branch), colour in zip(swimmers.items(), COLOURS, strict=False):
-                draw_lines(axes[place], branch.points, name, colour=colour)
-                axes[place].plot([], [], color=colour, label=f"$R_0/L_h$ = {length:g}")
-            axes[place].plot(ONSET, 0.0, MARKS["pitchfork"], color=style.INK, ms=3.5)
-            axes[place].set_xlabel(label(PECLET, "Péclet number"))
-        axes[0].set_ylabel(f"{label('velocity', 'swimming speed')} $(R_0/\\tau)$")
-        axes[1].set_ylabel(label("polarity"))
-        axes[0].legend()
-        branch = swimmers[5.0]
+            axes[2].set_title(style.quantity_value(scales, PECLET, across.scenario.values()[PECLET]))
+            axes[2].set_xlabel(style.quantity_label(scales, LENGTH))
+        colours = dict(zip(swimmers, style.LINES, strict=False))
+        for place, name in zip(axes, ("velocity", "polarity"), strict=False):
+            for length, one in swimmers.items():
+                drawn |= draw_lines(place, one.points, name, colour=colours[length])
+            place.plot(ONSET, 0.0, MARKS["pitchfork"], color=style.INK, ms=3.5)
+            place.set_xlabel(style.quantity_label(scales, PECLET))
+            place.set_ylabel(style.quantity_label(scales, name))
+        handles = [handle(style.quantity_value(scales, LENGTH, length), colour) for length, colour in colours.items()]
+        handles += [*line_handles(drawn, style.INK), handle("pitchfork", marker=MARKS["pitchfork"], linestyle="")]
+        figure.legend(handles=handles, ncols=len(handles), loc="outside lower center")
         steps = [point for point in branch.points if point.is_step]
         shown = [
             min(steps, key=lambda p: abs(p.parameter - wanted)) for wanted in np.geomspace(25.0, steps[-1].parameter, 3)
         ]
-        draw_states(axes[3], branch, shown, [f"Pe = {point.parameter:.0f}" for point in shown])
+        draw_states(
+            axes[-1], branch, shown, [style.quantity_value(scales, PECLET, point.parameter, ".0f") for point in shown]
+        )
         save(figure, out, "fig_5_branch")
 
 

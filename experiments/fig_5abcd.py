@@ -7,7 +7,7 @@ polarity P = 1 - H(0)/H(1) of its shape (b) (Sec. V B 1 of the paper). Shapes ar
 Parameters: Table 5 with k = 9, c_s = c0 (Fig. 5). The ranges of the grid are not named in the text: Pe = 25 to 300,
 R0/L_h = 0.1 to 10 are ours; 500 x 500 points as in the paper. Units: R0, kappa, tau = eta_b R0^2/kappa.
 
-Run:   python experiments/fig_5abcd.py [--quick] [--out DIR]        Time: 15 min on two cores, --quick 1 min.
+Run:   python experiments/fig_5abcd.py [--quick] [--out DIR]        Time: 12 min on two cores, --quick 1 min.
 
 Expect: every point converges to 1e-8; where screening is strong (R0/L_h >> 1) speed and polarity rise with Pe; at Pe =
 300 the polarity rises with R0/L_h and saturates, while the speed hardly changes. Along R0/L_h = 5 and Pe = 300 the map
@@ -18,28 +18,28 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 import shapespace as ss
-from common import Row, draw_starts, label, main, near, save
+from common import Row, draw_starts, main, near, save
 from shapespace.study.starts import Start
 from shapespace.view import style
 
 PECLET, LENGTH = "peclet", "inverse_hydrodynamic_length"
 FIRST, LAST, SHORT, LONG = 25.0, 300.0, 0.1, 10.0
+PAPER = 500
+"""Points on a side of the paper's grid."""
 SHOWN = ([(35.0, 5.0), (120.0, 5.0), (300.0, 5.0)], [(300.0, 0.1), (300.0, 2.0), (300.0, 10.0)])
 """States of (c) and of (d)."""
 
 
 def run(out: Path, quick: bool) -> list[Row]:
     """The map, figure, table."""
-    count = 12 if quick else 500
+    count = 12 if quick else PAPER
     axes = f"{PECLET}={FIRST:g}:{LAST:g}:{count}", f"{LENGTH}={SHORT:g}:{LONG:g}:{count}"
     case = ss.scenario("polar-swimmer")
     workers = 1 if quick else None
     found = ss.diagram(case, *axes, out=out / "map", resume=True, workers=workers)
-    rows = check_map(found)
+    rows = check_map(found, count)
     if not quick:
         draw(found, out)
         return rows + check_points(found, ((250, 250), (30, 480)))
@@ -47,8 +47,8 @@ def run(out: Path, quick: bool) -> list[Row]:
     return rows + check_points(found, ((7, 6),))
 
 
-def check_map(found: ss.Diagram) -> list[Row]:
-    """How many converged, and how speed and polarity change over the map."""
+def check_map(found: ss.Diagram, count: int) -> list[Row]:
+    """How many converged of count x count, and how speed and polarity change over the map."""
     data = found.dataset
     speed, polarity = (np.abs(data[name].transpose(LENGTH, PECLET).to_numpy()) for name in ("velocity", "polarity"))
     lengths = data[LENGTH].to_numpy()
@@ -60,8 +60,8 @@ def check_map(found: ss.Diagram) -> list[Row]:
     lost = found.points - found.converged
     rising = [bool((np.diff(values[screened], axis=1) > 0.0).all()) for values in (speed, polarity)]
     return [
-        Row("states on the grid", "500 x 500", f"{found.converged} of {found.points}, corrections < {worst:.0e}", "",
-            lost < 1e-3 * found.points and worst < 1e-8),
+        Row("states on the grid", "500 x 500", f"{count} x {count}, {lost} without a state, corrections < {worst:.0e}", "",
+            lost < 1e-3 * found.points and worst < 1e-8, "agrees" if count == PAPER else "coarser"),
         Row("speed rises with Pe at R0/L_h >> 1", "yes", f"to {speed[screened].max():.2f}", "", rising[0]),
         Row("polarity rises with Pe there", "yes", f"to {polarity[screened].max():.3f}", "", rising[1]),
         Row("Pe = 300: polarity with R0/L_h", "rises, saturates", f"{along[0]:.3f} to {along[-1]:.3f}", "",
@@ -88,22 +88,22 @@ def check_points(found: ss.Diagram, places: tuple[tuple[int, int], ...]) -> list
 def draw(found: ss.Diagram, out: Path) -> None:
     """Speed and polarity with contours, and below shapes along R0/L_h = 5 and along Pe = 300."""
     with style.house_style():
-        figure = Figure(figsize=(style.WIDTH_MM * style.MM, 115.0 * style.MM), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = style.new_figure(1.0, 115.0)
         axes = figure.subplots(2, 2, height_ratios=(1.0, 0.5))
-        data = found.dataset
-        for place, name, words in zip(
-            axes[0], ("velocity", "polarity"), ("speed $|v_0|$", "polarity $|P|$"), strict=True
-        ):
+        data, scales = found.dataset, found.scenario.scales
+        for place, name in zip(axes[0], ("velocity", "polarity"), strict=True):
             values = np.abs(data[name].transpose(LENGTH, PECLET))
             image = place.pcolormesh(data[PECLET], data[LENGTH], values, cmap=style.regulator_map(), rasterized=True)
             place.contour(data[PECLET], data[LENGTH], values, levels=8, colors=style.INK, linewidths=0.4)
-            figure.colorbar(image, ax=place, label=words).outline.set_visible(False)
-            place.set_xlabel(label(PECLET, "Péclet number"))
-        axes[0, 0].set_ylabel(style.math_symbol("R0/L_h"))
-        for place, shown, number, title in zip(axes[1], SHOWN, (0, 1), ("$R_0/L_h$ = 5", "Pe = 300"), strict=True):
+            figure.colorbar(
+                image, ax=place, label=f"magnitude of {style.quantity_label(scales, name)}"
+            ).outline.set_visible(False)
+            place.set_xlabel(style.quantity_label(scales, PECLET))
+        axes[0, 0].set_ylabel(style.quantity_label(scales, LENGTH))
+        for place, shown, number in zip(axes[1], SHOWN, (0, 1), strict=True):
             draw_shapes(place, found.scenario, shown, number)
-            place.set_title(title)
+            other = 1 - number
+            place.set_title(style.quantity_value(scales, (PECLET, LENGTH)[other], shown[0][other]))
         for place, letter in zip(axes.flat, "abcd", strict=True):
             place.set_title(f"({letter})", loc="left", fontweight="bold")
         save(figure, out, "fig_5abcd")
@@ -112,7 +112,7 @@ def draw(found: ss.Diagram, out: Path) -> None:
 def draw_shapes(axes: Axes, case: ss.Scenario, shown: list[tuple[float, float]], number: int) -> None:
     """States side by side, each with the key that differs."""
     states = [ss.steady(case.with_overrides({PECLET: peclet, LENGTH: length})) for peclet, length in shown]
-    names = [f"{('Pe', '$R_0/L_h$')[number]} = {keys[number]:g}" for keys in shown]
+    names = [style.quantity_value(case.scales, (PECLET, LENGTH)[number], keys[number]) for keys in shown]
     draw_starts(axes, [Start("", state.scenario, state.frame) for state in states], names)
 
 

@@ -28,7 +28,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 
 import shapespace as ss
-from common import Row, label, labelled, main, near, panels, resumed_branch, save
+from common import Row, labelled, main, near, panels, resumed_branch, save
 from fig_7b import AUTO
 from shapespace.study.boundaries import distances, find_changes
 from shapespace.study.curve_store import Curve, outline
@@ -188,6 +188,7 @@ def draw(
     """Regimes with curves and checks; on the right the same curves as far as they were followed."""
     with style.house_style():
         figure, (left, right) = panels((1.25, 1.0), 88.0)
+        scales = next(iter(curves.values())).scenario.scales
         if found is not None:
             draw_regimes(left, found, found.regimes)
         for axes in (left, right):
@@ -201,10 +202,11 @@ def draw(
             left.set(xlim=(0.0, 4.0), ylim=(400.0, MOST))
         else:
             left.set(xlim=(0.0, 8.12), ylim=(42.0, 518.0))
-        left.set_xlabel(label(RING))
+        left.set_xlabel(style.quantity_label(scales, RING))
         show_beyond(right)
+        right.set_xlabel(style.quantity_label(scales, RING))
         for axes in (left, right):
-            axes.set_ylabel(label(PECLET, "Péclet number"))
+            axes.set_ylabel(style.quantity_label(scales, PECLET))
         handles, names = left.get_legend_handles_labels()
         marks = (("x", "dynamics: one attractor"), ("o", "dynamics: two attractors"))
         handles += [Line2D([], [], color=style.INK, linestyle="", marker=mark, ms=4.0, mfc="none") for mark, _ in marks]
@@ -215,7 +217,6 @@ def draw(
 def show_beyond(axes: Axes) -> None:
     """The panel with the whole curves."""
     axes.set(xscale="log", yscale="log", xlim=(0.09, 60.0), ylim=(45.0, 2.3e3))
-    axes.set_xlabel(label(RING))
     axes.set_title("beyond the paper's range: the cusp")
 
 

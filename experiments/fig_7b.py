@@ -21,12 +21,11 @@ dynamics leave the ellipsoid at the fold and the dumbbell at the pitchfork.
 from pathlib import Path
 
 import numpy as np
-from matplotlib.lines import Line2D
 
 import shapespace as ss
-from common import COLOURS, Row, draw_states, jump, label, labelled, main, near, panels, ramp, resumed_branch, save
+from common import Row, draw_states, handle, jump, labelled, main, near, panels, ramp, resumed_branch, save
 from shapespace.view import style
-from shapespace.view.branch import MARKS, draw_lines
+from shapespace.view.branch import MARKS, draw_lines, line_handles
 
 KEY, NECK = "ring_amplitude", "equator_radius"
 LAST = {450.0: 4.2, 300.0: 6.0, 150.0: 8.0}
@@ -36,6 +35,7 @@ AUTO = (2.362474188, 1.293485375)
 SHOWN = 2.0
 """Ring amplitude of the three states drawn."""
 RAMP_STEP = 0.01
+RAMP_MARKS = {"up": "^", "down": "v"}
 
 
 def run(out: Path, quick: bool) -> list[Row]:
@@ -147,39 +147,31 @@ def draw(branches: dict[float, ss.Branch], loops: dict[str, list[dict[str, float
     """Branches with their special points and the ramps; on the right the three states at one ring amplitude."""
     with style.house_style():
         figure, (left, right) = panels((1.35, 1.0))
-        for branch, colour in zip(branches.values(), COLOURS, strict=False):
-            draw_lines(left, branch.points, NECK, colour=colour)
+        scales, drawn = branches[450.0].scenario.scales, set[str]()
+        colours = dict(zip(branches, style.LINES, strict=False))
+        for peclet, branch in branches.items():
+            drawn |= draw_lines(left, branch.points, NECK, colour=colours[peclet])
             for point in branch.special_points:
                 if point.kind in ("fold", "pitchfork"):
-                    left.plot(point.parameter, point.observables[NECK], MARKS[point.kind], color=colour, ms=3.5)
-        for name, marker in (("up", "^"), ("down", "v")):
-            for one in loops.get(name, []):
-                left.plot(one[KEY], one[NECK], marker, color=style.INK, ms=3.0, mfc="none", mew=0.6)
-        left.set_xlabel(label(KEY))
-        left.set_ylabel("neck radius $r(u = 1/2)$ $(R_0)$")
+                    left.plot(
+                        point.parameter, point.observables[NECK], MARKS[point.kind], color=colours[peclet], ms=3.5
+                    )
+        handles = [handle(style.quantity_value(scales, "peclet", peclet), colour) for peclet, colour in colours.items()]
+        handles += line_handles(drawn, style.INK)
+        handles += [handle(kind, marker=MARKS[kind], linestyle="") for kind in ("fold", "pitchfork")]
+        for name, reached in loops.items():
+            mark = {"marker": RAMP_MARKS[name], "ms": 3.0, "mfc": "none", "mew": 0.6, "linestyle": ""}
+            left.plot([one[KEY] for one in reached], [one[NECK] for one in reached], color=style.INK, **mark)
+            handles.append(handle(f"ramp {name}", **mark))
+        left.set_xlabel(style.quantity_label(scales, KEY))
+        left.set_ylabel(style.quantity_label(scales, NECK))
         left.set_xlim(0.0, None)
-        handles = [
-            Line2D([], [], color=colour, label=f"Pe = {peclet:g}")
-            for peclet, colour in zip(branches, COLOURS, strict=False)
-        ]
-        handles += [
-            Line2D([], [], color=style.INK, linestyle=line, label=text)
-            for line, text in (("-", "stable"), ("--", "unstable"))
-        ]
-        handles += [
-            Line2D([], [], color=style.INK, linestyle="", marker=mark, ms=3.5, mfc=face, label=text)
-            for mark, face, text in (
-                ("s", style.INK, "fold"),
-                ("D", style.INK, "pitchfork"),
-                ("^", "none", "ramp up"),
-                ("v", "none", "ramp down"),
-            )
-        ]
         figure.legend(handles=handles, ncols=5, loc="outside lower center")
         states = [point for point in branches[450.0].special_points if point.kind == "user"]
         names = ["ellipsoid, stable", "unstable", "dumbbell, stable"]
         draw_states(right, branches[450.0], states, names)
-        right.set_title(rf"the three states at Pe = 450, $\Delta_c$ = {SHOWN:g}")
+        at = ", ".join(style.quantity_value(scales, name, value) for name, value in (("peclet", 450.0), (KEY, SHOWN)))
+        right.set_title(f"the three states at {at}")
         save(figure, out, "fig_7b")
 
 

@@ -26,7 +26,6 @@ from common import Row, main, near, panels, save
 from shapespace.study.boundaries import distances, find_changes
 from shapespace.study.curve_store import Curve, outline
 from shapespace.view import style
-from shapespace.view.branch import quantity_label
 from shapespace.view.diagram import draw_boundaries, draw_regimes
 
 TURNOVER, LENGTH = "turnover_rate", "inverse_hydrodynamic_length"
@@ -132,8 +131,8 @@ def draw(found: ss.Diagram, seen: dict[tuple[float, float], float], out: Path) -
         for point, speed in seen.items():
             colour, told = (style.RED, "dynamics leaves") if speed > SWIMS else (style.BLUE, "dynamics returns")
             axes.plot(*point, "x", color=colour, ms=5.0, zorder=4, label=told)
-        axes.set_xlabel(quantity_label(found.scenario, TURNOVER))
-        axes.set_ylabel(style.math_symbol("R0/L_h"))
+        axes.set_xlabel(style.quantity_label(found.scenario.scales, TURNOVER))
+        axes.set_ylabel(style.quantity_label(found.scenario.scales, LENGTH))
         handles, names = axes.get_legend_handles_labels()
         once = dict(zip(names, handles, strict=True))
         figure.legend(once.values(), once.keys(), loc="outside right upper")

@@ -18,13 +18,12 @@ pitchforks.
 from pathlib import Path
 
 import numpy as np
-from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, NullFormatter
 
 import shapespace as ss
-from common import COLOURS, Row, draw_states, labelled, main, panels, resumed_branch, save
+from common import Row, draw_states, handle, labelled, main, panels, resumed_branch, save
 from shapespace.view import style
-from shapespace.view.branch import MARKS, draw_lines
+from shapespace.view.branch import MARKS, draw_lines, line_handles
 
 KEY, TURNOVER, NECK = "inverse_hydrodynamic_length", "turnover_rate", "equator_radius"
 FIRST, LAST = 0.3, 5.0
@@ -113,32 +112,30 @@ def draw(branches: dict[float, ss.Branch], out: Path) -> None:
     """Neck radius along the slices, and shapes along the stable one."""
     with style.house_style():
         figure, (left, right) = panels((1.2, 1.0))
-        for branch, colour in zip(branches.values(), COLOURS, strict=False):
-            draw_lines(left, branch.points, NECK, colour=colour)
+        scales, drawn = branches[45.0].scenario.scales, set[str]()
+        colours = dict(zip(branches, style.LINES, strict=False))
+        for turnover, branch in branches.items():
+            drawn |= draw_lines(left, branch.points, NECK, colour=colours[turnover])
             for point in labelled(branch, "pitchfork"):
-                left.plot(point.parameter, point.observables[NECK], MARKS["pitchfork"], color=colour, ms=3.5)
+                left.plot(point.parameter, point.observables[NECK], MARKS["pitchfork"], color=colours[turnover], ms=3.5)
         left.set_xscale("log")
         left.set_yscale("log")
         for axis, ticks in ((left.xaxis, (0.3, 0.5, 1.0, 2.0, 3.0, 5.0)), (left.yaxis, (0.003, 0.01, 0.03, 0.1))):
             axis.set_major_locator(FixedLocator(ticks))
             axis.set_major_formatter("{x:g}")
             axis.set_minor_formatter(NullFormatter())
-        left.set_xlabel(style.math_symbol("R0/L_h"))
-        left.set_ylabel("neck radius $r(u = 1/2)$ $(R_0)$")
-        handles = [
-            Line2D([], [], color=colour, label=f"$k$ = {value:g}")
-            for value, colour in zip(branches, COLOURS, strict=False)
-        ]
-        handles += [
-            Line2D([], [], color=style.INK, linestyle=line, label=text)
-            for line, text in (("-", "stable"), ("--", "unstable"))
-        ]
+        left.set_xlabel(style.quantity_label(scales, KEY))
+        left.set_ylabel(style.quantity_label(scales, NECK))
+        handles = [handle(style.quantity_value(scales, TURNOVER, value), colour) for value, colour in colours.items()]
+        handles += line_handles(drawn, style.INK)
         left.legend(handles=handles, loc="upper left")
         branch = branches[45.0]
         steps = [point for point in branch.points if point.is_step]
         shown = [min(steps, key=lambda p: abs(p.parameter - wanted)) for wanted in (FIRST, 1.0, LAST)]
-        draw_states(right, branch, shown, [f"{style.math_symbol('R0/L_h')} = {point.parameter:.2g}" for point in shown])
-        right.set_title("$k$ = 45")
+        draw_states(
+            right, branch, shown, [style.quantity_value(scales, KEY, point.parameter, ".2g") for point in shown]
+        )
+        right.set_title(style.quantity_value(scales, TURNOVER, 45.0))
         save(figure, out, "fig_7d")
 
 

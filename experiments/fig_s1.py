@@ -21,11 +21,11 @@ from pathlib import Path
 import numpy as np
 
 import shapespace as ss
-from common import Row, draw_starts, labelled, main, near, panels, resumed_branch, save
+from common import Row, draw_starts, handle, labelled, main, near, panels, resumed_branch, save
 from shapespace.base.arrays import Array
 from shapespace.study.starts import find_start
 from shapespace.view import style
-from shapespace.view.branch import MARKS, draw_lines
+from shapespace.view.branch import MARKS, draw_lines, line_handles
 
 KEY = "inverse_hydrodynamic_length"
 FIRST, LAST = 3.0, 7.0
@@ -92,20 +92,20 @@ def draw(symmetric: ss.Branch, sides: list[ss.Branch], out: Path) -> None:
     """Velocity along the branches, and the states at one R0/L_h."""
     with style.house_style():
         figure, (left, right) = panels((1.2, 1.0))
-        draw_lines(left, symmetric.points, "velocity", colour=style.BLUE)
+        scales = symmetric.scenario.scales
+        drawn = draw_lines(left, symmetric.points, "velocity", colour=style.BLUE)
         for side in sides:
-            draw_lines(left, side.points, "velocity", colour=style.RED)
+            drawn |= draw_lines(left, side.points, "velocity", colour=style.RED)
         for point in labelled(symmetric, "pitchfork"):
             left.plot(point.parameter, 0.0, MARKS["pitchfork"], color=style.BLUE, ms=3.5)
-        left.set_xlabel(style.math_symbol("R0/L_h"))
-        left.set_ylabel("velocity $v_0$ $(R_0/\\tau)$")
-        left.plot([], [], color=style.BLUE, label="symmetric")
-        left.plot([], [], color=style.RED, label="neck off the middle")
-        left.legend()
+        left.set_xlabel(style.quantity_label(scales, KEY))
+        left.set_ylabel(style.quantity_label(scales, "velocity"))
+        names = [handle("symmetric", style.BLUE), handle("neck off the middle", style.RED)]
+        left.legend(handles=[*names, *line_handles(drawn, style.INK)])
         states = [(symmetric, "symmetric"), *((side, "asymmetric") for side in sides)]
         starts = [find_start(f"{branch.store}:{labelled(branch, 'user')[0].label}") for branch, _ in states]
         draw_starts(right, starts, [name for _, name in states])
-        right.set_title(f"{style.math_symbol('R0/L_h')} = {SHOWN:g}")
+        right.set_title(style.quantity_value(scales, KEY, SHOWN))
         save(figure, out, "fig_s1")
 
 

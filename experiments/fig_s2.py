@@ -21,6 +21,7 @@ import numpy as np
 import shapespace as ss
 from common import Row, main, near, panels, resumed_branch, save
 from shapespace.base.arrays import Array
+from shapespace.base.scales import Scales
 from shapespace.study.engine import Engine, state_of
 from shapespace.study.starts import Start
 from shapespace.view import style
@@ -55,7 +56,7 @@ def run(out: Path, quick: bool) -> list[Row]:
             Row("its leading mode", "ring slips", str(rates.parities[0]), "", rates.parities[0] == "antisymmetric"),
             near("rate (second column: of the spectrum)", f"{leading:.5f}", measured, leading, 0.01 * abs(leading)),
         ]  # fmt: skip
-    draw(curves, out)
+    draw(curves, case.scales, out)
     return rows
 
 
@@ -80,17 +81,22 @@ def fitted(times: Array, sizes: Array) -> float:
     return float(np.polyfit(times[late], np.log(sizes[late]), 1)[0])
 
 
-def draw(curves: dict[float, tuple[Array, Array, float]], out: Path) -> None:
+def draw(curves: dict[float, tuple[Array, Array, float]], scales: Scales, out: Path) -> None:
     """The deviation over time beside what the spectrum says of it."""
     with style.house_style():
         figure, axes = panels((1.0, 1.0), 70.0)
         for place, (value, (times, sizes, rate)) in zip(axes, reversed(curves.items()), strict=True):
             place.semilogy(times, sizes, "o", color=style.BLUE, ms=2.5, label="dynamics")
             place.semilogy(
-                times, sizes[0] * np.exp(rate * times), color=style.INK, linewidth=0.8, label=f"exp({rate:.4g} t)"
+                times,
+                sizes[0] * np.exp(rate * times),
+                color=style.INK,
+                linewidth=0.8,
+                label=f"exp({style.number(rate, 4)} t)",
             )
-            place.set_title(f"$k$ = {value:g}: {'stable' if rate < 0.0 else 'unstable'}")
-            place.set_xlabel(r"time $t$ $(\tau)$")
+            at = style.quantity_value(scales, "turnover_rate", value)
+            place.set_title(f"{at}: {'stable' if rate < 0.0 else 'unstable'}")
+            place.set_xlabel(style.quantity_label(scales, "time"))
             place.set_ylabel(r"$\| f - f_0 \|$")
             place.legend()
         save(figure, out, "fig_s2")

@@ -72,6 +72,7 @@ def draw(runs: dict[str, ss.Run], quality: dict[str, Array], out: Path) -> None:
     """The mesh quality over time, and the height of the surface, which knows of no mesh."""
     with style.house_style():
         figure, (left, right) = panels((1.0, 1.0), 70.0)
+        scales = next(iter(runs.values())).scenario.scales
         names = {"sle": "SLE", "eulerian": "Eulerian", "lagrangian": "Lagrangian"}
         for (name, one), colour in zip(runs.items(), (style.BLUE, style.ORANGE, style.GREEN), strict=True):
             times = [frame.time for frame in one.frames]
@@ -81,9 +82,9 @@ def draw(runs: dict[str, ss.Run], quality: dict[str, Array], out: Path) -> None:
             right.plot(times, [frame.observables["height"] for frame in one.frames], color=colour, linewidth=width)
             right.plot(times[-1], one.observables["height"], "o", color=colour, ms=4)
         left.set_ylabel(r"mesh: $\max h/\min h$")
-        right.set_ylabel(r"height $(R_0)$")
+        right.set_ylabel(style.quantity_label(scales, "height"))
         for place in (left, right):
-            place.set_xlabel(r"time $t$ $(\tau)$")
+            place.set_xlabel(style.quantity_label(scales, "time"))
         left.legend()
         save(figure, out, "parameterizations")
 

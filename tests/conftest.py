@@ -36,6 +36,23 @@ def own_models() -> Iterator[None]:
         os.environ["SHAPESPACE_IMPORT"] = variable
 
 
+@pytest.fixture
+def pages_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every figure that a test writes to a file must have its texts on the page, and its legends beside its lines."""
+    from matplotlib.figure import Figure
+    from tests.pages import assert_legends_clear, assert_on_page
+
+    write = Figure.savefig
+
+    def checked(figure: Figure, target: object, **options: object) -> None:
+        if options.get("format") not in ("rgba", "raw"):  # frames of movies
+            assert_on_page(figure)
+            assert_legends_clear(figure)
+        write(figure, target, **options)
+
+    monkeypatch.setattr(Figure, "savefig", checked)
+
+
 # The same examples every time, so that what passed passes again; `--hypothesis-profile=random` explores new ones.
 settings.register_profile("random", deadline=None)
 settings.register_profile("fixed", derandomize=True, deadline=None)

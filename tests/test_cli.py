@@ -17,12 +17,10 @@ from tests.shell import Shell, one_complaint
 from tests.study.fakes import STEPS, FakeSimulation, install
 
 from shapespace.base.outcome import Outcome
-from shapespace.study import dataset as dataset_module
 from shapespace.study import files
 from shapespace.study import tables as tables_module
 from shapespace.study.scenario import load_scenario, scenario, scenario_names, template
 from shapespace.study.store import RunStore
-from shapespace.view import figure as figure_module
 from shapespace.view import show as show_module
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -309,9 +307,9 @@ def test_help_loads_no_numerical_library():
 
 def test_pictures_and_export_go_where_they_are_wanted(shell: Shell, monkeypatch: pytest.MonkeyPatch):
     dataset = xr.Dataset({"height": ("time", [1.0, 2.0])})
-    for module in (dataset_module, tables_module):
+    for module in (show_module, tables_module):
         monkeypatch.setattr(module, "open_dataset", lambda _: dataset)
-    monkeypatch.setattr(figure_module, "plot_run", lambda _: Figure())
+    monkeypatch.setattr(show_module, "plot_run", lambda _: Figure())
     monkeypatch.setattr(show_module, "movie", lambda _store, path, _progress: path)
     Path("run").mkdir()
     assert shell("plot", "run") == (0, "run/figure.png\n", "")

@@ -43,7 +43,7 @@ def test_diagram_maps_and_draws_swimmers(shell: Shell):
     assert Path("map/figure.png").stat().st_size > 10_000
     figure = plot_diagram(ss.open_diagram("map"))
     map_axes, bar = figure.axes
-    assert map_axes.get_xlabel() == "peclet $Pe$"
+    assert map_axes.get_xlabel() == "Péclet number $\\mathrm{Pe}$"
     assert map_axes.get_ylabel() == "inverse hydrodynamic length $R_{0}/L_h$"
     assert bar.get_ylabel() == r"velocity $v_{0}$ ($R_{0}/\tau$)"
     assert any(one.get_hatch() == HATCH for one in map_axes.collections)

@@ -58,13 +58,14 @@ def test_what_fails_is_named(shell: Shell):
         ("Fig_7A", ["7a"]),
         ("5_branch", ["5_branch"]),
         ("5", ["5abcd"]),
+        ("all", ["3a", "5_branch", "5abcd", "7a", "7b", "s1"]),
     ],
 )
 def test_a_figure_goes_by_its_parts(word: str, names: list[str]):
     assert reproducing._names(word, ["3a", "5_branch", "5abcd", "7a", "7b", "s1"]) == names
 
 
-@pytest.mark.parametrize("arguments", [(), ("9z",), ("x1", "fig_y")])
+@pytest.mark.parametrize("arguments", [(), ("9z",), ("x1", "fig_y"), ("all", "nonsense"), ("nonsense", "all")])
 def test_unknown_figures_are_refused(shell: Shell, arguments: tuple[str, ...]):
     assert "x1, x2, or all" in one_complaint(shell("reproduce", *arguments))
     assert not Path("results").exists()

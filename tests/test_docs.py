@@ -1,6 +1,7 @@
 """What README and docs show works: Python blocks run, shell lines are commands and targets that there are."""
 
 import json
+import os
 import re
 import shlex
 import shutil
@@ -14,6 +15,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from docs.executed import blocks_of, run_page
+from tests.shell import Shell
 
 import shapespace as ss
 from shapespace.cli import app
@@ -47,12 +49,24 @@ def short(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 _built_in = ss.scenario
 
 
-@pytest.mark.usefixtures("short")
+@pytest.mark.usefixtures("short", "own_models")
 def test_readme_python_runs():
     names = run_blocks(ROOT / "README.md")
     assert names["run"].outcome == "reached-end"
     assert Path("results/strong-ring/store.json").exists()
     assert names["data"].sizes["time"] > 2
+
+
+@pytest.mark.usefixtures("short", "own_models")
+def test_readme_has_the_law_that_its_commands_use(capsys: pytest.CaptureFixture[str]):
+    """What a reader has who has nothing but this page."""
+    (law,) = [block for block in blocks_of(ROOT / "README.md") if block.note == "file"]
+    Path(law.of).write_text(law.text)
+    for line in shell_lines():
+        if line[0] == "README.md" and law.of in line[1]:
+            few = ("-s", "elements=20", *(("--until", "1e-3") if " run " in line[1] else ()))
+            answer = Shell(capsys)(*shlex.split(line[1])[1:], *few)
+            assert answer.status == 0, answer.err
 
 
 @pytest.mark.usefixtures("short")
@@ -201,9 +215,26 @@ def test_shell_lines_are_commands_that_there_are(page: str, command: str, tmp_pa
             _built_in(name, **changes)
 
 
+def test_the_documentation_builds_without_a_warning(tmp_path: Path):
+    """References, directives and docstrings of all pages, as `make docs` builds them but without running them."""
+    options = ("-W", "--keep-going", "-q", "-D", "run_pages=0", "-b", "html", "-d", tmp_path / "trees")
+    command = [sys.executable, "-m", "sphinx", *options, ROOT / "docs", tmp_path / "html"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "src")}
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stderr
+    assert "shapespace.open_run" in (tmp_path / "html" / "api.html").read_text(encoding="utf-8")
+
+
+def test_the_interface_in_the_reference_is_whole():
+    reference = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    assert [name for name in ss.__all__ if f"shapespace.{name}\n" not in reference] == []
+
+
 def test_links_lead_somewhere():
     for page in PAGES:
-        for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
+        text = page.read_text(encoding="utf-8")
+        images = re.findall(r"^```\{image\} (\S+)$", text, flags=re.MULTILINE)
+        for target in [*re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text), *images]:
             made = "/".join(Path(target).parts[-2:])
             is_made = made.startswith("made/") and any(Path(target).name in block.text for block in blocks_of(page))
             assert target.startswith("http") or is_made or (page.parent / target).exists(), f"{page.name}: {target}"

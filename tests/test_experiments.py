@@ -23,14 +23,14 @@ def assert_holds(name: str, out: Path, quick: bool) -> None:
         assert (out / f"{name}.{suffix}").stat().st_size > 10_000
 
 
-@pytest.mark.usefixtures("own_models")
+@pytest.mark.usefixtures("own_models", "pages_checked")
 @pytest.mark.parametrize("name", QUICK)
 def test_quick(name: str, tmp_path: Path):
     assert_holds(name, tmp_path, quick=True)
 
 
 @pytest.mark.slow
-@pytest.mark.usefixtures("own_models")
+@pytest.mark.usefixtures("own_models", "pages_checked")
 @pytest.mark.parametrize("name", FULL)
 def test_full(name: str, tmp_path: Path):
     assert_holds(name, tmp_path, quick=False)

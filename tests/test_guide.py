@@ -26,7 +26,12 @@ def test_every_command_has_a_page_that_there_is():
         ("run guided-division -s pecklet=3", "glossary.md"),
         ("branch guided-division --vary nothing --stop 3", "how-to/follow-branches.md"),
         ("diagram polar-swimmer -x a -y b", "how-to/map-shape-space.md"),
-        ("export nowhere a.csv", "file-format.md"),
+        ("export nowhere a.csv", "how-to/export.md"),
+        ("plot nowhere", "how-to/draw-figures.md"),
+        ("plot nowhere --mode 0", "how-to/draw-figures.md"),
+        ("movie nowhere", "how-to/make-movies.md"),
+        ("steady vesicle --from nowhere", "file-format.md"),
+        ("verify --html /nowhere/x.html", "how-to/verify.md"),
         ("explore nowhere", "how-to/explore-in-the-browser.md"),
         ("--import nowhere.py run vesicle", "how-to/add-a-term.md"),
         ("unknown", "quickstart.md"),
@@ -45,5 +50,9 @@ def test_what_is_refused_names_its_page(
 def test_the_page_is_named_as_it_is_seen_from_here(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(DOCS.parent)
     assert page_for(["verify"]) == Path("docs/how-to/verify.md")
-    assert page_for(["verify"], StoreError("x")) == Path("docs/file-format.md")
+    assert page_for(["run"], StoreError("x")) == Path("docs/file-format.md")
+    assert page_for(["explore"], StoreError("x")) == Path("docs/how-to/explore-in-the-browser.md")
+    refused = StoreError("x")
+    refused.__cause__ = PermissionError()
+    assert page_for(["run"], refused) == Path("docs/quickstart.md")
     assert page_for(["run", "-s", "a=1"], InputError("x")) == Path("docs/glossary.md")

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from shapespace.study.diagram_store import open_diagram as open_diagram
     from shapespace.study.diagrams import diagram as diagram
     from shapespace.study.run import Run as Run
+    from shapespace.study.run import open_run as open_run
     from shapespace.study.run import run as run
     from shapespace.study.scenario import Scenario as Scenario
     from shapespace.study.scenario import load_scenario as load_scenario
@@ -60,6 +61,7 @@ _HOMES = {
     "open_diagram": "study.diagram_store",
     "open_dataset": "study.dataset",
     "Run": "study.run",
+    "open_run": "study.run",
     "run": "study.run",
     "Scenario": "study.scenario",
     "load_scenario": "study.scenario",

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from numpy.polynomial.polynomial import polyder, polyroots, polyval
 from tests.algebraic import AlgebraicProblem
-from tests.classic import carrier, middle
 
 from shapespace.analysis.bifurcation import SingularPoint, locate_branch_point, locate_fold
 from shapespace.analysis.branch import Bracket, Point, all_brackets, brackets, hermite
@@ -24,10 +23,12 @@ from shapespace.numerics.collocation import CollocationProblem
 from shapespace.study.verification.classic import (
     at_rest,
     bratu,
+    carrier,
     chafee_infante,
     chan,
     gelfand,
     mean_free,
+    middle,
     neumann_bratu,
 )
 

@@ -7,29 +7,16 @@ from shapespace.analysis.bifurcation import Kind, SingularPoint, locate_branch_p
 from shapespace.analysis.branch import Point
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
 from shapespace.analysis.curves import CurveKind, Special, own_parameter, parameters_at, start_curve, traced_curve
-from shapespace.analysis.extended import AbstractMeasure, Parameter
+from shapespace.analysis.extended import Parameter
 from shapespace.analysis.stationary import solve_stationary
 from shapespace.analysis.tracing import Located, traced
-from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import AbstractContinuableProblem
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.mesh import uniform_mesh
 from shapespace.numerics.newton import Newton
 from shapespace.numerics.system import Symmetry
 from shapespace.study.verification.classic import SecondOrder, at_rest, chan, mean_free
-
-
-class OwnParameter(AbstractMeasure):
-    """The parameter in which the singular point was found, the last entry of a fold's X."""
-
-    def value(self, problem: AbstractContinuableProblem, x: Array, p: Array) -> float:
-        return float(x[-1])
-
-    def gradient(self, problem: AbstractContinuableProblem, x: Array, p: Array) -> tuple[Array, Array]:
-        row = np.zeros_like(x)
-        row[-1] = 1.0
-        return row, np.zeros_like(p)
+from shapespace.study.verification.paths import OwnParameter
 
 
 def folds(problem: CollocationProblem, p: list[float], end: float) -> list[SingularPoint]:

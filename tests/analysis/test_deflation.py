@@ -1,12 +1,9 @@
 """Deflation: other solutions beside known ones, modulo the symmetry, on any mesh, with a record of every start tried."""
 
-from collections.abc import Sequence
-
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from tests.algebraic import AlgebraicProblem
-from tests.classic import carrier, middle
 
 from shapespace.analysis.bifurcation import Kind
 from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
@@ -14,43 +11,20 @@ from shapespace.analysis.deflation import (
     DeflatedProblem,
     Deflation,
     Guess,
-    Trial,
     images,
     is_same,
-    perturbed,
     search,
     solve_deflated,
 )
 from shapespace.analysis.extended import Parameter
-from shapespace.analysis.stability import Spectral, solve_spectrum
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
 from shapespace.analysis.tracing import Located, traced
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
-from shapespace.base.problem import REST, AbstractSmoothProblem
+from shapespace.base.problem import REST
 from shapespace.numerics.collocation import CollocationProblem
-from shapespace.study.verification.classic import at_rest, bratu
-
-
-def by_modes(trial: Trial, amplitudes: Sequence[float] = (0.3,)) -> list[Guess]:
-    """Guesses from a solution, moved along its leading modes."""
-    one = trial.found
-    assert isinstance(one.problem, AbstractSmoothProblem)
-    spectrum = solve_spectrum(one.problem, one.x, one.p, Spectral(count=3))
-    return perturbed(one, spectrum, f"solution {trial.number}", amplitudes)
-
-
-def solutions(guesses: Sequence[Guess], p: Array) -> list[Stationary]:
-    return [trial.found for trial in search(guesses, p, by_modes, options=Deflation(power=4.0)) if trial.is_new]
-
-
-def with_images(found: Sequence[Stationary]) -> int:
-    """How many solutions there are if mirror images count."""
-    total = 0
-    for one in found:
-        assert isinstance(one.problem, CollocationProblem)
-        total += len(images(one, one.problem))
-    return total
+from shapespace.study.verification.classic import at_rest, bratu, carrier, middle
+from shapespace.study.verification.paths import by_modes, solutions, with_images
 
 
 def test_row_6_counts_of_carriers_solutions():

@@ -4,7 +4,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from tests.algebraic import AlgebraicProblem
-from tests.classic import carrier, middle
 
 from shapespace.analysis.extended import AbstractMeasure, Affine, ExtendedProblem, Given, Parameter
 from shapespace.analysis.stationary import Stationary, solve_stationary, step_to
@@ -14,7 +13,7 @@ from shapespace.base.problem import REST, AbstractContinuableProblem
 from shapespace.numerics.adaptation import discretisation_error
 from shapespace.numerics.collocation import CollocationProblem
 from shapespace.numerics.newton import Newton, solve_root
-from shapespace.study.verification.classic import at_rest, bratu, mean_free
+from shapespace.study.verification.classic import at_rest, bratu, carrier, mean_free, middle
 
 TIGHT = Newton(1e-12)
 

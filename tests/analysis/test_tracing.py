@@ -2,64 +2,39 @@
 
 from collections.abc import Sequence
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.special import ellipk
-from tests.classic import carrier, circle, middle, ring
 
 from shapespace.analysis.bifurcation import Kind
 from shapespace.analysis.branch import Point
-from shapespace.analysis.continuation import Arclength, Continuation, Stop, start_point
-from shapespace.analysis.extended import Parameter
-from shapespace.analysis.stationary import solve_stationary
-from shapespace.analysis.tracing import Located, Missed, side_branches, traced
+from shapespace.analysis.continuation import Arclength
+from shapespace.analysis.tracing import Located, side_branches
 from shapespace.base.arrays import Array
-from shapespace.base.outcome import Outcome
 from shapespace.numerics.collocation import CollocationProblem
-from shapespace.numerics.mesh import uniform_mesh
-from shapespace.numerics.system import Symmetry
 from shapespace.study.verification.classic import (
-    SecondOrder,
     at_rest,
     bratu,
+    carrier,
     chafee_infante,
     chan,
+    circle,
+    constant,
+    elastica,
     gelfand,
     mean_free,
+    middle,
     neumann_bratu,
-    start_from,
+    ring,
 )
+from shapespace.study.verification.paths import begin, follow
 
 
 def branch_from(
-    problem: CollocationProblem,
-    x: Array,
-    p: Sequence[float],
-    index: int,
-    end: float,
-    direction: float = 1.0,
-    **options: float,
+    problem: CollocationProblem, x: Array, p: Sequence[float], end: float, direction: float = 1.0, **options: float
 ) -> tuple[list[Point], list[Located]]:
-    """All points and singular points up to a value of the parameter."""
-    found = solve_stationary(problem, x, np.array(p, dtype=float))
-    assert found.outcome is Outcome.CONVERGED
-    start = start_point(found.problem, found.x, found.p, index, direction)
-    assert isinstance(start, Point)
-    return follow(start, index, end, **options)
-
-
-def follow(start: Point, index: int, end: float, **options: float) -> tuple[list[Point], list[Located]]:
-    branch = Continuation([start], [Stop(Parameter(index), end, "end", True)], Arclength(**options))
-    points: list[Point] = []
-    located: list[Located] = []
-    for one in traced(branch):
-        assert not isinstance(one, Missed), f"{one.bracket.kind} near {one.bracket.after.parameter}: {one.outcome}"
-        if isinstance(one, Located):
-            located.append(one)
-        else:
-            points.append(one)
-    return points, located
+    """All points and singular points up to a value of the first parameter."""
+    return follow(begin(problem, x, p, direction=direction), end, options=Arclength(**options))
 
 
 def check(located: Sequence[Located], exact: Sequence[tuple[Kind, float]], rounding: float = 1e-12) -> None:
@@ -75,7 +50,7 @@ def check(located: Sequence[Located], exact: Sequence[tuple[Kind, float]], round
 
 
 def test_row_1_bratu():
-    points, located = branch_from(bratu(), at_rest(bratu()), [1.0], 0, 1.0, first=0.1)
+    points, located = branch_from(bratu(), at_rest(bratu()), [1.0], 1.0, first=0.1)
     check(located, [(Kind.FOLD, 3.513830719125161)])
     assert middle(points[-1].problem, points[-1].x) == pytest.approx(4.091467246189261, abs=1e-8)
 
@@ -84,72 +59,54 @@ def test_row_2_gelfand():
     """Infinitely many folds around lambda = 2, in three dimensions with a pole at r = 0."""
     problem = gelfand()
     folds = [3.321992118, 1.664156190, 2.108541102, 1.967465559]
-    start = start_point(problem, at_rest(problem), np.zeros(1), 0)
-    assert isinstance(start, Point)
-    branch = Continuation([start], (), Arclength(first=0.1, max_points=400))
-    located = []
-    for one in traced(branch):
-        assert not isinstance(one, Missed)
-        if isinstance(one, Located):
-            located.append(one)
-        if len(located) == len(folds):
-            break
+    _, located = follow(begin(problem, at_rest(problem), [0.0]), 100.0, len(folds))
     check(located, [(Kind.FOLD, value) for value in folds], 5e-10)
 
 
 def test_row_3_branch_points_of_a_constant_state():
     """Exact branch points at u = 1 + n^2 pi^2/10, all pitchforks by reflection or half a period's shift."""
     problem = neumann_bratu(40)
-    one = np.ones(problem.n)
-    one[1:] = 0.0
-    x = start_from(problem, lambda u: 0.1 * one + 0.0 * u[:, None], lambda u: np.zeros((len(u), problem.n)))
+    x = constant(problem, (0.1, 0.0))
     amplitudes = 1.0 + np.arange(1, 3) ** 2 * np.pi**2 / 10.0
     exact = [(Kind.FOLD, np.exp(-1.0)), *((Kind.PITCHFORK, a * np.exp(-a)) for a in amplitudes)]
-    _, located = branch_from(problem, x, [0.1 * np.exp(-0.1)], 0, 0.02, first=0.1)
+    _, located = branch_from(problem, x, [0.1 * np.exp(-0.1)], 0.02, first=0.1)
     check(located, exact)
 
 
 def test_row_4_an_integral_condition():
-    _, located = branch_from(mean_free(), at_rest(mean_free()), [3.0, 0.0], 0, 3.0, first=0.1)
+    _, located = branch_from(mean_free(), at_rest(mean_free()), [3.0, 0.0], 3.0, first=0.1)
     check(located[:1], [(Kind.FOLD, 11.923790201)], 5e-10)
 
 
 def test_row_5_chan():
-    _, located = branch_from(chan(), at_rest(chan()), [0.0, 0.01], 0, 6.0, first=0.1)
+    _, located = branch_from(chan(), at_rest(chan()), [0.0, 0.01], 6.0, first=0.1)
     check(located, [(Kind.FOLD, 4.041401867), (Kind.FOLD, 3.155897933)], 5e-10)
 
 
 def test_row_7_chafee_and_infante():
     """Pitchforks at n^2, and the side branches in elliptic functions: found on both sides, and again on the way back."""
     problem = chafee_infante(40)
-    _, located = branch_from(problem, at_rest(problem), [0.5], 0, 10.0, first=0.1)
+    _, located = branch_from(problem, at_rest(problem), [0.5], 10.0, first=0.1)
     check(located, [(Kind.PITCHFORK, 1.0), (Kind.PITCHFORK, 4.0), (Kind.PITCHFORK, 9.0)])
     k = 0.5
     value = (2.0 * float(ellipk(k**2)) / np.pi) ** 2 * (1.0 + k**2)
     tops = []
     for start in side_branches(located[0].point, located[0].bracket.after.tangent, 0.05):
-        points, _ = follow(start, 0, value)
+        points, _ = follow(start, value)
         tops.append(middle(points[-1].problem, points[-1].x))
-        _, back = follow(points[-1].reversed(), 0, 1.2 * value)
+        _, back = follow(points[-1].reversed(), 1.2 * value)
         check(back, [(Kind.PITCHFORK, 1.0)])
     np.testing.assert_allclose(sorted(tops), [-np.sqrt(0.4), np.sqrt(0.4)], atol=1e-8)
-
-
-def elastica() -> CollocationProblem:
-    """theta'' + P sin theta = 0, theta'(0) = theta'(1) = 0 (row 8)."""
-    mirror = Symmetry(False, (-1.0, -1.0), (0.0, 0.0))
-    system = SecondOrder(lambda x, y, p: p[0] * jnp.sin(y), parameters=("load",), neumann=(True, True), mirror=mirror)
-    return CollocationProblem(system, uniform_mesh(40), 4, 1e-8)
 
 
 def test_row_8_the_elastica():
     """P_n = (n pi)^2 and, on the first branch, P/P_1 = (2 K(sin(alpha/2))/pi)^2 at the end angle alpha."""
     problem = elastica()
-    _, located = branch_from(problem, at_rest(problem), [5.0], 0, 45.0, first=0.1)
+    _, located = branch_from(problem, at_rest(problem), [5.0], 45.0, first=0.1)
     check(located, [(Kind.PITCHFORK, np.pi**2), (Kind.PITCHFORK, 4.0 * np.pi**2)])
     start = side_branches(located[0].point, located[0].bracket.after.tangent, 0.05)[0]
     for angle, ratio in ((20.0, 1.015396866), (90.0, 1.393203930), (120.0, 1.884800869)):
-        points, _ = follow(start, 0, ratio * np.pi**2)
+        points, _ = follow(start, ratio * np.pi**2)
         end = points[-1]
         assert isinstance(end.problem, CollocationProblem)
         theta = end.problem.unpack(end.x).nodes[0, 0]
@@ -159,8 +116,7 @@ def test_row_8_the_elastica():
 def test_row_6_carrier():
     """From eps = 0.6 down to 0.22: pitchforks at 0.4688625139 and 0.2347252903 on the branches through them."""
     problem = carrier(40)
-    guess = start_from(problem, lambda u: np.zeros((len(u), problem.n)), lambda u: np.zeros((len(u), problem.n)))
-    points, located = branch_from(problem, guess, [0.6], 0, 0.22, -1.0, first=0.05)
+    points, located = branch_from(problem, at_rest(problem), [0.6], 0.22, -1.0, first=0.05)
     values = sorted(one.point.parameter for one in located if one.point.kind is Kind.PITCHFORK)
     known = np.array([0.2347252903, 0.4688625139])
     assert values
@@ -175,11 +131,11 @@ def test_row_9_the_elastic_ring():
     Where sides touch nothing is transmitted across the ring but k^2/2 - s at the contact, with k = -1 and s = 1/2 there.
     """
     problem = ring(120)
-    _, located = branch_from(problem, circle(problem, 0.5), [0.5], 0, 16.0, first=0.1)
+    _, located = branch_from(problem, circle(problem, 0.5), [0.5], 16.0, first=0.1)
     check(located, [(Kind.PITCHFORK, n**2 - 1.0) for n in (2, 3, 4)])
     touching = 5.24688696
     for start in side_branches(located[0].point, located[0].bracket.after.tangent, 0.05):
-        points, special = follow(start, 0, touching)
+        points, special = follow(start, touching)
         assert all(abs(one.point.parameter - 3.0) < 1e-9 for one in special)  # where it starts
         end = points[-1]
         assert isinstance(end.problem, CollocationProblem)

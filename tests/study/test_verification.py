@@ -6,7 +6,10 @@ import re
 import pytest
 from tests.shell import Shell
 
-from shapespace.study.verification import continuation, membranes, spheres, table
+from shapespace.analysis.bifurcation import Kind
+from shapespace.analysis.continuation import Arclength
+from shapespace.study.verification import buckling, classic, continuation, membranes, spheres, table
+from shapespace.study.verification.paths import begin, singular
 from shapespace.study.verification.record import Benchmark, Row, Verification
 from shapespace.study.verification.states import Absent
 from shapespace.study.verification.table import BENCHMARKS, measured
@@ -65,10 +68,42 @@ def test_the_command_reports_and_fails(shell: Shell, monkeypatch: pytest.MonkeyP
     assert shell("verify", "--html", "no/page.html").status == 2
 
 
-@pytest.mark.parametrize("compute", [spheres.resting, membranes.near_sphere, continuation.branch_points])
+@pytest.mark.parametrize(
+    "compute",
+    [
+        spheres.resting,
+        spheres.swimming,
+        membranes.near_sphere,
+        continuation.bratu,
+        continuation.chafee_infante,
+        continuation.chan,
+        buckling.elastica,
+        buckling.films,
+    ],
+)
 def test_some_benchmarks_pass(compute):
-    for row in compute():
+    rows = list(compute())
+    assert len(rows) > 0
+    for row in rows:
         assert row.passed, f"{row.name}: {row.value} not {row.reference}, {row.note}"
+
+
+def test_every_benchmark_has_its_own_title_and_rows_of_their_own_names():
+    titles = [benchmark.title for benchmark in BENCHMARKS]
+    assert len({*titles}) == len(titles)
+    names = [row.name for row in continuation.integral()]
+    assert len({*names}) == len(names)
+
+
+def test_a_branch_without_what_is_looked_for_says_so():
+    problem = classic.chafee_infante(20)
+    start = begin(problem, classic.at_rest(problem), [0.5])
+    with pytest.raises(Absent, match="pitchfork was found in place of a fold"):
+        singular(start, Kind.FOLD, 1)
+    with pytest.raises(Absent, match="0 of 1 singular points found; the branch ended so: max-steps"):
+        singular(start, Kind.FOLD, 1, Arclength(max_points=3))
+    with pytest.raises(Absent, match="no state to start from"):
+        begin(classic.bratu(), classic.at_rest(classic.bratu()), [30.0])
 
 
 @pytest.mark.slow

@@ -13,6 +13,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from shapespace.study.scenario import scenario
+
 Array = NDArray[np.float64]
 Curve = Callable[[float], tuple[Array, Array]]  # time -> fine (r, z), from the top pole down
 
@@ -33,7 +35,7 @@ _SYMBOLS = {
     "local_spontaneous_curvature": ("C_0", "1/R0"),
     "local_tension": ("gamma_H", "kappa/R0**2"),
     "height": ("d", "R0"),
-    "equator_radius": ("r_n", "R0"),
+    "equator_radius": ("r(1/2)", "R0"),
     "ring_position": ("u_m", "1"),
     "velocity": ("v_0", "R0/tau"),
     "max_concentration": ("c_max", "c0"),
@@ -73,7 +75,7 @@ def _geometry(curve: Curve, time: float) -> tuple[dict[str, Array], float]:
     return {name: np.asarray(values[::stride], dtype=np.float64) for name, values in fields.items()}, float(s[-1])
 
 
-def _dataset(scenario: str, model: str, times: Sequence[float], frames: Sequence[Frame]) -> xr.Dataset:
+def _dataset(name: str, model: str, times: Sequence[float], frames: Sequence[Frame]) -> xr.Dataset:
     rim = "Rb" if model == "open-membrane" else "R0"
     dataset = xr.Dataset(
         {
@@ -81,17 +83,21 @@ def _dataset(scenario: str, model: str, times: Sequence[float], frames: Sequence
             **{n: ("time", np.array([f.observables[n] for f in frames])) for n in frames[0].observables},
         },
         coords={"time": np.asarray(times, dtype=np.float64)},
-        attrs={"scenario": scenario, "model": model, "outcome": "stationary", "parameters": json.dumps({})},
+        attrs={"scenario": name, "model": model, "outcome": "stationary", "parameters": _parameters(name)},
     )
     dataset["time"].attrs = {"long_name": "time", "symbol": "t", "units": "tau"}
-    for name in dataset.data_vars:
-        symbol, units = _SYMBOLS[str(name)]
-        dataset[name].attrs = {
-            "long_name": str(name).replace("_", " "),
+    for key in dataset.data_vars:
+        symbol, units = _SYMBOLS[str(key)]
+        dataset[key].attrs = {
+            "long_name": str(key).replace("_", " "),
             "symbol": symbol,
             "units": units.replace("R0", rim),
         }
     return dataset
+
+
+def _parameters(name: str) -> str:
+    return json.dumps(scenario(name).values())
 
 
 def _ramp(time: float, centre: float, width: float) -> float:
@@ -145,7 +151,7 @@ def _swimmer_curve(slip: Callable[[float], float], drift: Callable[[float], floa
     return curve
 
 
-def _swimmer(scenario: str, slip_time: float, end: float, frames: int, speed: float) -> xr.Dataset:
+def _swimmer(name: str, slip_time: float, end: float, frames: int, speed: float) -> xr.Dataset:
     def slip(time: float) -> float:
         return _ramp(time, slip_time, 0.25)
 
@@ -174,7 +180,7 @@ def _swimmer(scenario: str, slip_time: float, end: float, frames: int, speed: fl
             "equator_radius": float(np.interp(0.5, u, fields["radius"])),
         }
         made.append(Frame(fields, observables))
-    return _dataset(scenario, "closed-surface", list(times), made)
+    return _dataset(name, "closed-surface", list(times), made)
 
 
 def ring_slipping(frames: int = 80) -> xr.Dataset:
@@ -221,9 +227,9 @@ FRAMES = 24  # of the shared datasets
 
 
 @cache
-def dataset_of(scenario: str) -> xr.Dataset:
+def dataset_of(name: str) -> xr.Dataset:
     """The made-up run of a scenario, made once."""
-    return MAKERS[scenario](frames=FRAMES)
+    return MAKERS[name](frames=FRAMES)
 
 
 @cache

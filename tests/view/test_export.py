@@ -3,17 +3,21 @@
 import struct
 import zlib
 from base64 import b64decode
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import numpy as np
 import pandas as pd
 import pytest
+import pyvista
 import xarray as xr
 from tests.app.stores import make_map
 from tests.shell import Shell, one_complaint
 
 import shapespace as ss
+from shapespace.study.tables import branch_dataset
+from shapespace.view import style
 from shapespace.view.mesh import AROUND, Mesh, ply_bytes, revolved, vtk_bytes
 
 RADIUS = 1.3
@@ -69,7 +73,7 @@ def test_an_open_surface_has_a_rim():
 def test_vtk_holds_what_the_mesh_has():
     """Decoded by hand: blocks of zlib in base64."""
     mesh = sphere()
-    root = ET.fromstring(vtk_bytes(mesh, {"concentration": "c0"}, 2.5))
+    root = ET.fromstring(vtk_bytes(mesh, {"concentration": "c0"}, 2.5, {"peclet": 22.0}))
     arrays = {}
     for element in root.iter("DataArray"):
         text = (element.text or "").strip()
@@ -82,24 +86,59 @@ def test_vtk_holds_what_the_mesh_has():
     np.testing.assert_allclose(arrays["velocity"].reshape(-1, 3), mesh.data["velocity"], atol=1e-6)
     np.testing.assert_array_equal(arrays["connectivity"].reshape(-1, 3), mesh.triangles)
     assert arrays["offsets"][-1] == mesh.triangles.size
-    assert arrays["TimeValue"].tolist() == [2.5]
+    assert (arrays["TimeValue"].tolist(), arrays["peclet"].tolist()) == ([2.5], [22.0])
 
 
 def test_pyvista_reads_both(tmp_path: Path):
-    pyvista = pytest.importorskip("pyvista", reason="reading meshes needs the extra shapespace[export]")
     mesh = sphere()
-    (tmp_path / "a.vtp").write_bytes(vtk_bytes(mesh, {}, 2.5))
-    (tmp_path / "a.ply").write_bytes(ply_bytes(mesh, "closed-surface", (-RADIUS, RADIUS)))
+    (tmp_path / "a.vtp").write_bytes(vtk_bytes(mesh, {}, 2.5, {"peclet": 22.0}))
+    (tmp_path / "a.ply").write_bytes(ply_bytes(mesh, "closed-surface", (-RADIUS, RADIUS), {"peclet": 22.0}))
     for name in ("a.vtp", "a.ply"):
         read = pyvista.read(tmp_path / name)
         np.testing.assert_allclose(read.points, mesh.points, atol=1e-6)
-        assert read.n_cells == len(mesh.triangles)
+        np.testing.assert_array_equal(read.regular_faces, mesh.triangles)
         assert read.area == pytest.approx(4.0 * np.pi * RADIUS**2, rel=2e-3)
         assert read.is_manifold
     read = pyvista.read(tmp_path / "a.vtp")
-    np.testing.assert_allclose(read["concentration"], mesh.data["concentration"], atol=1e-6)
-    np.testing.assert_allclose(read["velocity"], mesh.data["velocity"], atol=1e-6)
-    assert read.field_data["TimeValue"][0] == 2.5
+    assert {*read.point_data} == {*mesh.data}
+    for name, values in mesh.data.items():
+        np.testing.assert_allclose(read[name], values, atol=1e-6, err_msg=name)
+    assert {name: float(read.field_data[name][0]) for name in read.field_data} == {"TimeValue": 2.5, "peclet": 22.0}
+
+
+def read_ply(path: Path) -> tuple[np.ndarray, list[str]]:
+    """The vertices of a binary PLY with all their properties, and its comments."""
+    head, _, body = path.read_bytes().partition(b"end_header\n")
+    lines = head.decode().splitlines()
+    types = {"float": "<f4", "uchar": "u1"}
+    kinds = [
+        (words[2], types[words[1]]) for line in lines if len(words := line.split()) == 3 and words[0] == "property"
+    ]
+    count = next(int(line.split()[2]) for line in lines if line.startswith("element vertex"))
+    return np.frombuffer(body, np.dtype(kinds), count), [line[8:] for line in lines if line.startswith("comment ")]
+
+
+def test_ply_holds_what_the_mesh_has(tmp_path: Path):
+    """Every field as a property with its values, also those that a reader of shapes leaves out, and the numbers of the state."""
+    mesh = sphere()
+    (tmp_path / "a.ply").write_bytes(ply_bytes(mesh, "closed-surface", (-RADIUS, RADIUS), {"peclet": 22.0}))
+    vertices, comments = read_ply(tmp_path / "a.ply")
+    assert comments == ["peclet 22.0"]
+    columns = {"x": mesh.points[:, 0], "nz": mesh.data["normal"][:, 2], "velocity_z": mesh.data["velocity"][:, 2]}
+    columns |= {name: values for name, values in mesh.data.items() if values.ndim == 1}
+    for name, values in columns.items():
+        np.testing.assert_allclose(vertices[name], values, atol=1e-6, err_msg=name)
+    top, bottom = (vertices[["red", "green", "blue"]][i].tolist() for i in (0, -1))
+    assert top == pytest.approx(255 * np.array(style.regulator_map()(1.0)[:3]), abs=1)
+    assert bottom == pytest.approx(255 * np.array(style.regulator_map()(0.0)[:3]), abs=1)
+
+
+def speed_of(data: xr.Dataset) -> np.ndarray:
+    return np.hypot(data["tangential_velocity"], data["normal_velocity"]).to_numpy()
+
+
+def timesteps(series: Path) -> list[float]:
+    return [float(one.attrib["timestep"]) for one in ET.fromstring(series.read_bytes()).iter("DataSet")]
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +162,14 @@ def test_a_run_is_read_back(stores: Path, tmp_path: Path):
     series = ss.export(stores / "run", tmp_path / "meshes", form="vtk")
     entries = [*ET.fromstring(series.read_bytes()).iter("DataSet")]
     np.testing.assert_array_equal([float(one.attrib["timestep"]) for one in entries], data["time"])
-    assert all((series.parent / one.attrib["file"]).is_file() for one in entries)
+    last = pyvista.read(series.parent / entries[-1].attrib["file"])
+    assert last.field_data["TimeValue"][0] == data["time"][-1]
+    assert len(last.points) == 2 + AROUND * (data.sizes["point"] // 2 - 1)
+    np.testing.assert_allclose(last["concentration"][0], data["concentration"][-1, 0], rtol=1e-6)
+    np.testing.assert_allclose(last["concentration"][1::AROUND], data["concentration"][-1, 2::2], rtol=1e-6)
+    np.testing.assert_allclose(
+        np.linalg.norm(last["velocity"][1:-1:AROUND], axis=1), speed_of(data)[-1, 2:-1:2], rtol=1e-5
+    )
     folder = ss.export(stores / "run", tmp_path / "ply", form="ply")
     assert len([*folder.glob("*.ply")]) == data.sizes["time"]
 
@@ -142,8 +188,39 @@ def test_a_branch_is_read_back(stores: Path, tmp_path: Path):
     assert len(pd.read_csv(ss.export(stores / "branch", tmp_path / "b.csv", form="csv"), comment="#")) == len(
         data["label"]
     )
+    series = ss.export(stores / "branch", tmp_path / "meshes", form="vtk")
+    assert timesteps(series) == [point.parameter for point in branch.points]
+    one = ss.export(f"{stores / 'branch'}:pitchfork-1", tmp_path / "one", form="vtk")
+    assert timesteps(one) == pytest.approx([22.0])
+    assert pyvista.read(one.parent / "000000.vtp").field_data["peclet"][0] == timesteps(one)[0]
     profile = pd.read_csv(ss.export(f"{stores / 'branch'}:pitchfork-1", tmp_path / "p.csv", form="csv"), comment="#")
     np.testing.assert_allclose(np.hypot(profile["radius"], profile["axial_position"]), 1.0, rtol=1e-6)
+
+
+def test_where_a_key_turns_states_are_numbered(stores: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The key is in each file all the same."""
+    branch = ss.open_branch(stores / "branch")
+    turned = [replace(point, parameter=22.0 - abs(point.parameter - 22.0)) for point in branch.points]
+    data = branch_dataset(replace(branch, points=tuple(turned)))
+    monkeypatch.setattr("shapespace.view.export.stored_dataset", lambda _: data)
+    series = ss.export(stores / "branch", tmp_path / "meshes", form="vtk")
+    assert timesteps(series) == [*range(len(turned))]
+    assert pyvista.read(series.parent / "000001.vtp").field_data["peclet"][0] == turned[1].parameter
+
+
+@pytest.mark.parametrize(("name", "form"), [("a.nc", "csv"), ("a.csv", "netcdf"), ("a.ply", "vtk"), ("a.vtp", "csv")])
+def test_an_ending_that_promises_another_form_is_refused(
+    stores: Path,
+    name: str,
+    form: str,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+):
+    monkeypatch.chdir(tmp_path)
+    told = one_complaint(Shell(capsys)("export", stores / "run", name, f"--{form}"))
+    assert f"{name}: its ending promises" in told
+    assert not [*tmp_path.iterdir()]
 
 
 def test_the_command_chooses_the_form(

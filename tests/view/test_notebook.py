@@ -1,5 +1,7 @@
 """What notebooks show: pages that say what a result says, pictures in them, movies that play and are saved."""
 
+import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -8,12 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.app.stores import make_map
 
 import shapespace as ss
 from shapespace.base.errors import InputError
 from shapespace.study.searching import search_states
+from shapespace.view.movie import Scene
 from shapespace.view.notebook import Animation, outline_svg
 from shapespace.view.show import film_of
+from shapespace.view.typeset import html_of, symbol_tex, units_tex
 
 
 class Balanced(HTMLParser):
@@ -60,6 +65,17 @@ def test_a_scenario_shows_its_keys():
     assert "until" in text
 
 
+def test_symbols_and_units_are_typeset_as_in_figures():
+    page = ss.scenario("guided-division")._repr_html_()
+    assert "(<i>ξ</i><i>Δ</i><i>μ</i>)<sub>0</sub>" in page
+    assert "<i>κ</i>\N{THIN SPACE}<i>τ</i>/<i>R</i><sub>0</sub><sup>2</sup>" in page
+    assert not re.search(r"kappa|tau\b|Delta_|\^2|\\", page)
+    assert html_of(symbol_tex("C_phi^phi")) == "<i>C</i><sub><i>φ</i></sub><sup><i>φ</i></sup>"
+    assert html_of(symbol_tex("max c")) == "max\N{THIN SPACE}<i>c</i>"
+    assert html_of(units_tex("pN nm/um^2")) == "pN\N{THIN SPACE}nm/μm<sup>2</sup>"
+    assert html_of(r"\frac{a}{<b>}") == r"\frac{a}{&lt;b&gt;}"
+
+
 def test_a_run_shows_how_it_ended_and_plays():
     run = ss.run(ss.scenario("polar-swimmer", until=1e-3, elements=20))
     text = shown(run)
@@ -69,6 +85,40 @@ def test_a_run_shows_how_it_ended_and_plays():
     assert run.plot().axes
     with pytest.raises(InputError, match="observable"):
         run.plot("pressure")
+    movie = run.animate(seconds=0.2)
+    assert movie.data[4:8] == b"ftyp"
+    assert "<video" in movie._repr_html_()
+
+
+def test_a_stored_run_is_itself_again(tmp_path: Path):
+    """Its page, its figure and its movie; also of a run that is not finished."""
+    run = ss.run(ss.scenario("polar-swimmer", until=1e-3, elements=20), out=tmp_path / "run")
+    again = ss.open_run(tmp_path / "run")
+    assert (again.outcome, again.steps, again.observables) == (run.outcome, run.steps, run.observables)
+    assert again.scenario == run.scenario
+    assert "reached-end" in shown(again)
+    assert again.plot().axes
+    assert again.animate(seconds=0.2).ending == ".mp4"
+    manifest = json.loads((tmp_path / "run" / "store.json").read_text())
+    (tmp_path / "run" / "store.json").write_text(json.dumps(manifest | {"status": "running", "outcome": None}))
+    assert ss.open_run(tmp_path / "run").outcome is None
+    assert "unfinished" in shown(ss.open_run(tmp_path / "run"))
+    with pytest.raises(ss.StoreError, match="made"):
+        ss.open_run(tmp_path)
+
+
+def test_curves_and_maps_show_their_figures(stores: Path):
+    key = "saturation_concentration"
+    curve = ss.curve(f"{stores / 'branch'}:pitchfork-1", key, 1.02, start=1.0, out=stores / "curve")
+    text = shown(curve)
+    assert f"pitchfork in the plane of peclet and {key}" in text
+    assert "end-1" in text
+    make_map(stores / "map", 3)
+    text = shown(ss.open_diagram(stores / "map"))
+    assert "9, 9 with a state" in text
+    for thing in (curve, ss.open_diagram(stores / "map")):
+        assert 'src="data:image/png;base64,' in thing._repr_html_()
+        assert thing.plot().axes
 
 
 def test_a_branch_shows_its_diagram_and_special_points(stores: Path):
@@ -92,9 +142,16 @@ def test_a_film_of_a_branch_goes_along_its_key_or_along_its_arc(stores: Path):
     turned = replace(
         branch, points=tuple(replace(one, parameter=at) for one, at in zip(points, (1.0, 2.0, 1.5), strict=True))
     )
-    film = film_of(turned)
-    np.testing.assert_array_equal(film["time"], [point.place for point in points])
-    assert film["time"].attrs["words"] == "arclength"
+    turning = film_of(turned)
+    np.testing.assert_array_equal(turning["time"], [point.place for point in points])
+    assert turning["time"].attrs["words"] == "arclength"
+    # Both are shown: how far along the branch, and at which value of the key.
+    for data, symbols in ((film, ["$\\mathrm{Pe}$ = "]), (turning, ["$s$ = ", "$\\mathrm{Pe}$ = "])):
+        scene = Scene(data, 3, 64)
+        assert [clock.symbol for clock in scene._clocks[: len(symbols)]] == symbols
+    for frame, key in ((0, 1.0), (2, 1.5)):
+        scene.show(frame)
+        assert float(scene._clocks[1]._digits.get_text()) == key
 
 
 def test_a_search_shows_its_states():

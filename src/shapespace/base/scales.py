@@ -59,8 +59,8 @@ QUANTITIES: dict[str, Quantity] = {
     "normal_friction": Quantity("Gamma_n", "friction with the surroundings along the normal", Dimension(-4, 1, 1)),
     "tension": Quantity("gamma", "isotropic tension, given or holding the area", _TENSION),
     "boundary_tension": Quantity("gamma0", "tension of the reservoir at the rim", _TENSION),
-    "active_tension": Quantity("(xi Delta_mu)_0", "active tension at saturation", _TENSION),
-    "peclet": Quantity("Pe", "Peclet number (xi Delta_mu)_0 R0^2 / (D eta_b)", _NUMBER),
+    "active_tension": Quantity("(xi Delta mu)_0", "active tension at saturation", _TENSION),
+    "peclet": Quantity("Pe", "Peclet number (xi Delta mu)_0 R0^2 / (D eta_b)", _NUMBER),
     "inverse_hydrodynamic_length": Quantity(
         "R0/L_h", "ratio of R0 to the hydrodynamic length sqrt(eta_b/Gamma)", _NUMBER
     ),

@@ -11,7 +11,7 @@ PAGES = {
     "config": FIRST,
     "run": FIRST,
     "steady": FIRST,
-    "plot": FIRST,
+    "plot": "how-to/draw-figures.md",
     "movie": "how-to/make-movies.md",
     "branch": BRANCHES,
     "curve": BRANCHES,
@@ -24,15 +24,19 @@ PAGES = {
     "reproduce": "how-to/verify.md",
 }
 STORES, LAWS, KEYS = "file-format.md", "how-to/add-a-term.md", "glossary.md"
+LOOKING = ("plot", "movie", "export", "explore")
+"""Commands whose pages say more of a store that they cannot show than what is in one."""
 
 
 def page_for(tokens: Sequence[str], error: Exception | None = None) -> Path:
     """The page for a command line that failed: of what is stored, of laws of one's own, of keys, or of the command."""
-    if isinstance(error, StoreError):
+    command = next((token for token in tokens if token in PAGES), "")
+    # A file that the system refuses is no matter of the format.
+    is_refused = error is not None and isinstance(error.__cause__, OSError)
+    if isinstance(error, StoreError) and command not in LOOKING and not is_refused:
         return _found(STORES)
     if any(token.partition("=")[0] == "--import" for token in tokens):
         return _found(LAWS)
-    command = next((token for token in tokens if token in PAGES), "")
     if (
         error is not None
         and command in ("config", "run", "steady")

@@ -14,6 +14,7 @@ from shapespace.cli.shared import Store, StoreOrLabel, app, examples
         "shapespace plot results/guided-division",
         "shapespace plot results/guided-division --out division.pdf",
         "shapespace plot results/guided-division --budget",
+        "shapespace plot results/sphere:pitchfork-1",
         "shapespace plot results/sphere:pitchfork-1 --mode 0",
     )
 )
@@ -21,7 +22,10 @@ def plot(
     store: StoreOrLabel,
     /,
     *,
-    out: Annotated[Path | None, Parameter(metavar="FILE", help="Picture file; the default is DIR/figure.png.")] = None,
+    out: Annotated[
+        Path | None,
+        Parameter(metavar="FILE", help="Picture file; the default is DIR/figure.png, of a label DIR/LABEL.png."),
+    ] = None,
     mode: Annotated[
         int | None,
         Parameter(
@@ -44,52 +48,17 @@ def plot(
 
     Of a run a curve over time, snapshots of the surface, profiles of velocity and curvature; of a branch an observable
     against the key that varies, solid where it is stable, with its special points; of a curve the plane of its two keys; of
-    a diagram a map of an observable over that plane; of a mode the state displaced by it, the velocity of that motion, and
-    profiles along the curve; with --budget what goes into energy and heat, what supplies it, and what the energy law leaves
-    over.
+    a diagram a map of an observable over that plane; of a search, a stored state or a labelled point the surface with its
+    flow and its profiles; of a mode the state displaced by it, the velocity of that motion, and profiles along the curve;
+    with --budget what goes into energy and heat, what supplies it, and what the energy law leaves over.
     """
     from shapespace.study.files import replacing
-    from shapespace.study.records import noun_of
+    from shapespace.view.show import plot as draw
 
-    path, name = Path(store), "figure.png"
-    noun = noun_of(path)
-    if observable is not None and (noun not in ("branch", "diagram") or mode is not None):
-        raise InputError(f"--observable {observable}: is for the figure of a branch or a diagram; leave it away.")
-    if budget and (noun not in (None, "run") or mode is not None):
-        raise InputError("--budget: is for the figure of a run or of a state that `steady` stored; leave it away.")
-    if mode is not None:
-        from shapespace.study.modes import find_modes
-        from shapespace.view.mode import plot_mode
-
-        figure = plot_mode(find_modes(store), mode)
-        folder, _, label = (store, "", "") if path.is_dir() else store.rpartition(":")
-        path, name = Path(folder), "-".join(filter(None, [label, f"mode-{mode}.png"]))
-    elif noun == "curve":
-        from shapespace.study.curve_store import open_curve
-        from shapespace.view.curve import plot_curve
-
-        figure = plot_curve(open_curve(path))
-    elif noun == "diagram":
-        from shapespace.study.diagram_store import open_diagram
-        from shapespace.view.diagram import plot_diagram
-
-        figure = plot_diagram(open_diagram(path), observable)
-    elif noun == "branch":
-        from shapespace.study.branch_store import open_branch
-        from shapespace.view.branch import plot_branch
-
-        figure = plot_branch(open_branch(path), observable)
-    elif budget:
-        from shapespace.study.dataset import open_dataset
-        from shapespace.view.budget import plot_budget
-
-        figure, name = plot_budget(open_dataset(path)), "budget.png"
-    else:
-        from shapespace.study.dataset import open_dataset
-        from shapespace.view.figure import plot_run
-
-        figure = plot_run(open_dataset(path))
-    target = out or path / name
+    figure = draw(store, observable=observable, mode=mode, budget=budget)
+    folder, _, label = (store, "", "") if Path(store).is_dir() else store.rpartition(":")
+    what = [label, f"mode-{mode}" if mode is not None else "budget" if budget else "" if label else "figure"]
+    target = out or Path(folder) / f"{'-'.join(filter(None, what))}.png"
     if target.suffix[1:] not in (known := figure.canvas.get_supported_filetypes()):
         raise InputError(f"{target}: has no ending of a picture; end it in one of .{', .'.join(sorted(known))}.")
     with replacing(target) as partial:
@@ -150,14 +119,14 @@ def export(
     from rich.console import Console
     from rich.progress import Progress
 
-    from shapespace.view.export import ENDINGS
+    from shapespace.view.export import FORMS
     from shapespace.view.export import export as write
 
     asked = [
         form for form, wanted in zip(("netcdf", "csv", "vtk", "ply"), (netcdf, csv, vtk, ply), strict=True) if wanted
     ]
     if not asked and file is not None:
-        asked = [form for form, ending in ENDINGS.items() if file.suffix == ending]
+        asked = [form for ending, form in FORMS.items() if file.suffix == ending and form in ("netcdf", "csv")]
     if len(asked) != 1:
         what = f"{file}: does not tell the form by its ending; end it in .nc or .csv, or give" if file else "give"
         raise InputError(f"{what if not asked else 'give only'} one of --netcdf, --csv, --vtk, --ply.")

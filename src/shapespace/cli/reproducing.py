@@ -41,8 +41,8 @@ def _names(word: str, known: Sequence[str]) -> list[str]:
     asked = re.fullmatch(r"(s?\d+)([a-z]*)", word)
     parts = [(name, match) for name in known if (match := re.fullmatch(r"(s?\d+)([a-z]*)", name))]
     found = [name for name, match in parts if asked and match[1] == asked[1] and {*asked[2]} <= {*match[2]}]
-    if word in known:
-        return [word]
+    if word in (ALL, *known):
+        return [*known] if word == ALL else [word]
     if not found:
         raise InputError(f"{word}: is no figure; choose some of {', '.join(known)}, or all.")
     return found
@@ -72,7 +72,7 @@ def reproduce(
     known = figure_names(folder)
     if not figures:
         raise InputError(f"reproduce: needs figures; give some of {', '.join(known)}, or all.")
-    wanted = known if ALL in figures else [*dict.fromkeys(name for one in figures for name in _names(one, known))]
+    wanted = [*dict.fromkeys(name for one in figures for name in _names(one, known))]
     if str(folder) not in sys.path:
         sys.path.insert(0, str(folder))
     records = [_reproduced(name, out, quick, as_json) for name in wanted]

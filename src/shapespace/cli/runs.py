@@ -27,6 +27,7 @@ from shapespace.cli.shared import (
 )
 
 if TYPE_CHECKING:
+    from shapespace.base.outcome import Outcome
     from shapespace.study.run import Run
 
 
@@ -123,27 +124,29 @@ def run_command(
         words = ["shapespace", "run", scenario, *options, "--out", str(path), "--resume"]
         tell(f"interrupted; to continue: {shlex.join(words)}")
         return INTERRUPTED
-    print(json.dumps(_record(result), allow_nan=False)) if as_json else _summarise(result)
+    outcome = result.outcome
+    assert outcome is not None
+    print(json.dumps(_record(result, outcome), allow_nan=False)) if as_json else _summarise(result, outcome)
     if result.warning:
         tell(result.warning)
-    if result.outcome.is_success:
+    if outcome.is_success:
         return 0
-    tell(f"the solver gave up ({result.outcome}): {result.outcome.advice} The partial run is in {result.store}.")
+    tell(f"the solver gave up ({outcome}): {outcome.advice} The partial run is in {result.store}.")
     return GAVE_UP
 
 
-def _record(run: "Run") -> dict[str, object]:
+def _record(run: "Run", outcome: "Outcome") -> dict[str, object]:
     return {
-        **described(run.outcome, run.scenario, run.observables),
+        **described(outcome, run.scenario, run.observables),
         "store": str(run.store),
         "steps": run.steps,
         "wall_time": run.wall_time,
     }
 
 
-def _summarise(run: "Run") -> None:
+def _summarise(run: "Run", outcome: "Outcome") -> None:
     print_observables(run.scenario, run.observables)
     print_lines(
-        f"{run.outcome}: {run.outcome.advice}",
+        f"{outcome}: {outcome.advice}",
         f"{run.steps} steps, {run.wall_time:.1f} s; stored in {run.store}",
     )

@@ -56,7 +56,7 @@ app = App(
 Store = Annotated[Path, Parameter(name="DIR", help="Directory of a run or a branch, as `shapespace` made it.")]
 StoreOrLabel = Annotated[
     str,
-    Parameter(name="DIR[:LABEL]", help="Directory of any store; of a branch or a curve also a labelled point."),
+    Parameter(name="DIR[:LABEL]", help="Directory of any store, or one state of it by its label or number."),
 ]
 NameOrFile = Annotated[
     str, Parameter(name="NAME_OR_FILE", help="A built-in scenario, a TOML file, or a store for its scenario.")

@@ -43,6 +43,7 @@ def probe_solve() -> str:
     from shapespace.study.scenario import scenario
 
     result = run(scenario("guided-division", until=1e-3, elements=20))
+    assert result.outcome is not None
     if not result.outcome.is_success:
         raise RuntimeError(f"{result.outcome}: {result.outcome.advice}")
     return f"{result.steps} time steps in {result.wall_time:.1f} s, compilation included"

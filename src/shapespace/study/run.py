@@ -30,12 +30,13 @@ _FINAL = {Outcome.STATIONARY, Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING}
 
 @dataclass(frozen=True)
 class Run(Plotted):
-    """How a run ended and what it left. `steps` counts from the initial state, `wall_time` is in seconds of this call.
+    """How a run ended, None where it is not finished, and what it left. `steps` counts from the initial state, `wall_time` is in
+    seconds of this call, zero for a run that was only read.
 
     `observables` are those of the last frame, in the scenario's units. `frames` are there only for a run without store.
     """
 
-    outcome: Outcome
+    outcome: Outcome | None
     scenario: Scenario
     store: Path | None
     observables: dict[str, float]
@@ -69,9 +70,9 @@ class Run(Plotted):
         from shapespace.study.dataset import meridian_of
 
         facts = {
-            "outcome": f"{self.outcome}: {self.outcome.advice}",
+            "outcome": f"{self.outcome}: {self.outcome.advice}" if self.outcome else "unfinished",
             "time": f"{self.observables['time']:.6g}",
-            "steps": f"{self.steps}, {self.wall_time:.1f} s",
+            "steps": f"{self.steps}, {self.wall_time:.1f} s" if self.wall_time else str(self.steps),
             "store": str(self.store or "in memory"),
         }
         facts |= {"warning": self.warning} if self.warning else {}
@@ -126,6 +127,13 @@ def run(
         outcome = _advance(store, progress, first)
         last = _observables(store.read(-1))
         return Run(outcome, store.scenario, store.path, last, len(store) - 1, perf_counter() - began)
+
+
+def open_run(path: str | Path) -> Run:
+    """A stored run or state, finished or not. StoreError where there is none, or nothing in it yet."""
+    store = RunStore.open(path)
+    last = find_start(store.path).frame
+    return Run(store.outcome, store.scenario, store.path, _observables(last), len(store) - 1, 0.0)
 
 
 def store_frame(path: str | Path, scenario: Scenario, frame: Frame, outcome: Outcome) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.frame import Array, Frame, arrays_of, frame_of_arrays, read_arrays, write_arrays
-from shapespace.study.presenting import Presented, Summary, Table
+from shapespace.study.presenting import Plotted, Summary, Table
 from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import Scenario
 
@@ -126,7 +126,7 @@ class SearchStore(AbstractRecordStore[Tried]):
 
 
 @dataclass(frozen=True)
-class Search(Presented):
+class Search(Plotted):
     """Stationary states of a scenario that a search found. tried: every start, in order, with what it led to."""
 
     outcome: Outcome | None

@@ -18,12 +18,14 @@ from shapespace.study.diagram_store import open_diagram
 from shapespace.study.frame import Frame
 from shapespace.study.records import CONVENTIONS, noun_of
 from shapespace.study.scenario import Scenario
-from shapespace.study.search_store import open_search
-from shapespace.study.starts import find_start
+from shapespace.study.search_store import Search, open_search
+from shapespace.study.starts import Start, find_start
 
 STATE, POINT = "state", "point"
 RATES = 6
 """Growth rates of a point that a table has."""
+VARIED = "varied"
+"""Attribute: the key that varies from state to state, of a curve both with a blank between."""
 
 
 def stored_dataset(text: str | Path) -> xr.Dataset:
@@ -39,13 +41,28 @@ def stored_dataset(text: str | Path) -> xr.Dataset:
         # NetCDF takes words and numbers; Zarr takes what JSON does.
         return data.assign_attrs({name: _plain(value) for name, value in data.attrs.items()})
     if noun == "search":
-        search = open_search(path)
-        frames = [one.frame for one in search.states if one.frame]
-        return _states([search.scenario] * len(frames), frames, {})
-    if noun is None and ":" in str(text) and not path.is_dir():
-        start = find_start(text)
-        return _states([start.scenario], [start.frame], {})
+        return search_dataset(open_search(path))
+    if names_state(text):
+        return state_dataset(find_start(text))
     return open_dataset(path)
+
+
+def names_state(text: str | Path) -> bool:
+    """Whether this is `STORE:LABEL`, and not the directory of a store."""
+    return ":" in str(text) and not Path(text).is_dir()
+
+
+def search_dataset(search: Search) -> xr.Dataset:
+    """Fields (state, point) and observables (state) of the states that a search found. InputError where there is none."""
+    frames = [one.frame for one in search.states if one.frame]
+    return _states([search.scenario] * len(frames), frames, {})
+
+
+def state_dataset(start: Start) -> xr.Dataset:
+    """The same of one state, with its values of the keys that vary where it comes from."""
+    values = start.scenario.values()
+    data = _states([start.scenario], [start.frame], {key: [values[key]] for key in start.keys})
+    return data.assign_attrs({VARIED: " ".join(start.keys)})
 
 
 def branch_dataset(branch: Branch) -> xr.Dataset:
@@ -63,7 +80,7 @@ def branch_dataset(branch: Branch) -> xr.Dataset:
     unit = {"units": f"1/{branch.scenario.scales.unit('time')}", "long_name": "leading growth rates"}
     data["growth_rate"] = ((STATE, "rate"), rates[..., 0], unit)
     data["growth_frequency"] = ((STATE, "rate"), rates[..., 1], unit | {"long_name": "their imaginary parts"})
-    return _described(data, branch)
+    return _described(data, branch).assign_attrs({VARIED: branch.key})
 
 
 def curve_dataset(curve: Curve) -> xr.Dataset:
@@ -72,7 +89,7 @@ def curve_dataset(curve: Curve) -> xr.Dataset:
     columns = {key: [point.parameters[i] for point in points] for i, key in enumerate(curve.keys)}
     columns |= {f"{key}_error": [point.parameter_errors[i] for point in points] for i, key in enumerate(curve.keys)}
     data = _states([curve.scenario_at(point) for point in points], [point.frame for point in points], columns)
-    return _described(data, curve)
+    return _described(data, curve).assign_attrs({VARIED: " ".join(curve.keys)})
 
 
 def _states(
@@ -80,7 +97,7 @@ def _states(
 ) -> xr.Dataset:
     """Profiles, observables and further columns of states, with units."""
     if not frames:
-        raise InputError("there is no state in this store to export.")
+        raise InputError("there is no state in this store.")
     scales = scenarios[0].scales
     fields = [profile_of(*one) for one in zip(scenarios, frames, strict=True)]
     data = {name: ((STATE, POINT), np.stack([one[name] for one in fields])) for name in fields[0]}
@@ -93,7 +110,8 @@ def _states(
         if quantity is not None:
             variable.attrs |= {"long_name": quantity.meaning, "symbol": quantity.symbol}
             variable.attrs["units"] = scales.unit(str(name).removesuffix("_error"))
-    return made.assign_attrs(scenario=scenarios[0].name, kind=scenarios[0].kind, conventions=CONVENTIONS)
+    about = {"scenario": scenarios[0].name, "kind": scenarios[0].kind, "parameters": json.dumps(scenarios[0].values())}
+    return made.assign_attrs(about, conventions=CONVENTIONS)
 
 
 def _described(data: xr.Dataset, path: Branch | Curve) -> xr.Dataset:

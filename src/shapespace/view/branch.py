@@ -3,24 +3,23 @@
 from collections.abc import Sequence
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from shapespace.base.errors import InputError
-from shapespace.base.scales import QUANTITIES
 from shapespace.study.branch_point import BranchPoint
 from shapespace.study.branch_store import Branch
-from shapespace.study.scenario import Scenario
 from shapespace.study.telling import most_telling
 from shapespace.view import style
 from shapespace.view.labels import label_points
+from shapespace.view.limits import not_magnified
 
 MARKS = {"fold": "s", "pitchfork": "D", "transcritical": "D", "branch-point": "D", "hopf": "o", "user": "|", "end": ""}
 """By kind; physical ends and stalls are crosses."""
 HEIGHT_MM = 110.0
+MARGIN = 0.1
+"""Above and below the lines, for labels."""
 
 
 def plot_branch(branch: Branch, observable: str | None = None) -> Figure:
@@ -31,18 +30,23 @@ def plot_branch(branch: Branch, observable: str | None = None) -> Figure:
         names = ", ".join(branch.points[0].observables) if branch.points else "none"
         raise InputError(f"{name}: is no observable of this branch; choose one of {names}.")
     with style.house_style():
-        figure = Figure(figsize=(style.WIDTH_MM * 0.75 * style.MM, HEIGHT_MM * style.MM), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = style.new_figure(0.75, HEIGHT_MM)
         axes = figure.add_subplot()
         lines = draw_lines(axes, branch.points, name)
         specials = [point for point in known if point in branch.special_points]
         _draw_specials(axes, specials, name)
-        axes.margins(0.06, 0.1)
-        axes.set_xlabel(quantity_label(branch.scenario, branch.key))
-        axes.set_ylabel(quantity_label(branch.scenario, name))
-        axes.legend(handles=_legend(lines), loc="best")
+        axes.margins(x=0.06)
+        axes.set_ylim(*_range([point.observables[name] for point in known], branch.scenario.scales.factor(name)))
+        axes.set_xlabel(style.quantity_label(branch.scenario.scales, branch.key))
+        axes.set_ylabel(style.quantity_label(branch.scenario.scales, name))
+        axes.legend(handles=line_handles(lines), loc="best")
         label_points(axes, [(one.label, one.parameter, one.observables[name]) for one in specials if one.kind != "end"])
     return figure
+
+
+def _range(values: Sequence[float], scale: float) -> tuple[float, float]:
+    low, high = not_magnified(min(values), max(values), scale)
+    return low - MARGIN * (high - low), high + MARGIN * (high - low)
 
 
 def telling_observable(branch: Branch) -> str:
@@ -104,17 +108,10 @@ def _draw_specials(axes: Axes, points: Sequence[BranchPoint], name: str) -> None
         axes.plot(point.parameter, point.observables[name], mark, color=style.RED, markersize=4.0, zorder=3)
 
 
-def quantity_label(scenario: Scenario, name: str) -> str:
-    """Name, symbol and unit of a key or an observable, for an axis."""
-    quantity = QUANTITIES[name]
-    attributes = {"symbol": quantity.symbol, "units": scenario.scales.unit(name)}
-    return style.axis_label(xr.DataArray(0.0, name=name, attrs=attributes), words=name.replace("_", " "))
-
-
-def _legend(lines: set[str]) -> list[Line2D]:
-    """What the lines mean, of those that are drawn."""
+def line_handles(lines: set[str], stable: str = style.BLUE) -> list[Line2D]:
+    """What the lines mean, for a legend, of those that were drawn. stable: colour of what is stable."""
     handles = [
-        Line2D([], [], color=style.BLUE, linestyle="-", label="stable"),
+        Line2D([], [], color=stable, linestyle="-", label="stable"),
         Line2D([], [], color=style.INK, linestyle="--", label="unstable"),
         Line2D([], [], color=style.INK, linestyle=":", label="stability not known"),
     ]

@@ -5,13 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from shapespace.base.errors import InputError
 from shapespace.view import style
-from shapespace.view.panels import scale_logarithmically
+from shapespace.view.limits import scale_by_powers
 
 LINES = {
     "energy_rate": ("dF/dt", style.INK, "-"),
@@ -42,20 +41,19 @@ def plot_budget(dataset: xr.Dataset) -> Figure:
 
 def _plot_run(dataset: xr.Dataset) -> Figure:
     count = 4 if "amount" in dataset else 3
-    figure = Figure(figsize=(style.WIDTH_MM * 0.8 * style.MM, count * PANEL_MM * style.MM), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.new_figure(0.8, count * PANEL_MM)
     rows: Sequence[Axes] = figure.subplots(count, 1, sharex=True)
     time, heat = dataset["time"].values, dataset["dissipation"].values
     rows[0].plot(time, dataset["energy"], color=style.INK)
-    rows[0].set_ylabel(style.axis_label(dataset["energy"], words="energy"))
+    rows[0].set_ylabel(style.axis_label(dataset["energy"]))
     for name in _moving(dataset):
         words, colour, line = LINES[name]
         rows[1].plot(time, dataset[name], color=colour, linestyle=line, label=words)
     rows[1].axhline(0.0, color=style.FAINT, linewidth=0.6, zorder=1)
     if heat[-1] < _QUIET * np.nanmax(heat):
-        # Whole powers, so that ticks and the linear part around zero keep apart.
-        linear = float(10.0 ** np.floor(np.log10(_QUIET * np.nanmax(heat))))
-        rows[1].set_yscale("symlog", linthresh=linear, linscale=1.0)
+        powers = np.concatenate([dataset[name].values for name in _moving(dataset)])
+        span = float(np.nanmin(powers, initial=0.0)), float(np.nanmax(powers, initial=0.0))
+        scale_by_powers(rows[1], "y", _QUIET * float(np.nanmax(heat)), span, room=0.1)
     rows[1].set_ylabel(f"power ({style.units_of(dataset['dissipation'])})")
     rows[1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="into heat, supply (dashed)")
     rest = np.abs(dataset["energy_residual"].values)
@@ -66,10 +64,10 @@ def _plot_run(dataset: xr.Dataset) -> Figure:
     rows[2].legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     if count > 3:
         rows[3].plot(time, dataset["amount"], color=style.INK)
-        rows[3].set_ylabel(style.axis_label(dataset["amount"], words="amount"))
+        rows[3].set_ylabel(style.axis_label(dataset["amount"]))
         rows[3].yaxis.set_major_locator(MaxNLocator(4))
     _scale_time(rows[-1], dataset)
-    rows[-1].set_xlabel(style.axis_label(dataset["time"], words="time"))
+    rows[-1].set_xlabel(style.axis_label(dataset["time"]))
     return figure
 
 
@@ -85,7 +83,7 @@ def _scale_time(axes: Axes, dataset: xr.Dataset) -> None:
     half = float(np.interp(0.5 * share[-1], share, time))
     if time[0] == 0.0 and 0.0 < half < _EARLY * time[-1]:
         early = float(10.0 ** np.floor(np.log10(half / 10.0)))
-        scale_logarithmically(axes, early, float(time[-1]))
+        scale_by_powers(axes, "x", early, (0.0, float(time[-1])), room=0.08)
         axes.set_xlim(0.0, time[-1])
 
 
@@ -93,8 +91,7 @@ def _plot_state(dataset: xr.Dataset) -> Figure:
     """A bar for each power of one state: what dissipates, what supplies (pale), what is left over."""
     names = [*_moving(dataset), "energy_residual"]
     words = [*(LINES[name][0] for name in names[:-1]), "rest of the energy law"]
-    figure = Figure(figsize=(style.WIDTH_MM * 0.6 * style.MM, (18 + 7 * len(names)) * style.MM), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.new_figure(0.6, 18.0 + 7.0 * len(names))
     axes = figure.subplots()
     values = np.abs([float(dataset[name][0]) for name in names])
     colours = [*(LINES[name][1] for name in names[:-1]), style.FAINT]

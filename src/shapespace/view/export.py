@@ -5,10 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from shapespace.base.errors import InputError
 from shapespace.study.files import storage, write_atomically
-from shapespace.study.tables import stored_dataset
+from shapespace.study.tables import VARIED, stored_dataset
 from shapespace.view.frames import REGULATORS
 from shapespace.view.mesh import mesh_of, ply_bytes, vtk_bytes, vtk_series
 
@@ -17,6 +18,8 @@ Progress = Callable[[int, int], None]
 
 ENDINGS = {"netcdf": ".nc", "csv": ".csv", "vtk": "-vtk", "ply": "-ply"}
 """By form, how the name of the file or folder ends."""
+FORMS = {".nc": "netcdf", ".csv": "csv", ".vtp": "vtk", ".vtk": "vtk", ".pvd": "vtk", ".ply": "ply"}
+"""By ending, the form that a name promises."""
 
 
 def export(
@@ -29,6 +32,10 @@ def export(
     """
     if form not in ENDINGS:
         raise InputError(f"form = {form!r}: must be one of {', '.join(ENDINGS)}.")
+    if out is not None and FORMS.get(Path(out).suffix, form) != form:
+        raise InputError(
+            f"{out}: its ending promises {FORMS[Path(out).suffix]}, not {form}; choose another name or form."
+        )
     text = str(source).rstrip("/")
     target = Path(out) if out is not None else Path(text.replace(":", "-") + ENDINGS[form])
     data = stored_dataset(text)
@@ -66,17 +73,36 @@ def csv_of(data: xr.Dataset) -> str:
 
 def _write_meshes(data: xr.Dataset, folder: Path, form: str, progress: Progress) -> Path:
     units = {str(name): variable.attrs.get("units", "") for name, variable in data.variables.items()}
-    values = data["time"].to_numpy() if "time" in data else np.arange(data.sizes["state"], dtype=float)
+    series = _series(data)
+    keys = ["time"] if "time" in data else _varied(data)
     carried = REGULATORS.get(data.attrs["kind"], "")
     span = (min(0.0, float(data[carried].min())), float(data[carried].max())) if carried in data else (0.0, 1.0)
-    names = {f"{number:06d}.{'vtp' if form == 'vtk' else 'ply'}": float(value) for number, value in enumerate(values)}
+    names = {f"{number:06d}.{'vtp' if form == 'vtk' else 'ply'}": float(value) for number, value in enumerate(series)}
     for number, (name, value) in enumerate(names.items()):
         mesh = mesh_of(data, number)
-        content = vtk_bytes(mesh, units, value) if form == "vtk" else ply_bytes(mesh, data.attrs["kind"], span)
+        told = {key: float(data[key][number]) for key in keys}
+        is_vtk = form == "vtk"
+        content = vtk_bytes(mesh, units, value, told) if is_vtk else ply_bytes(mesh, data.attrs["kind"], span, told)
         write_atomically(folder / name, content)
         progress(number + 1, len(names))
     if form == "ply":
         return folder
-    series = folder / "series.pvd"
-    write_atomically(series, vtk_series(names))
-    return series
+    write_atomically(folder / "series.pvd", vtk_series(names))
+    return folder / "series.pvd"
+
+
+def _varied(data: xr.Dataset) -> list[str]:
+    """The keys that vary from state to state."""
+    return str(data.attrs.get(VARIED, "")).split()
+
+
+def _series(data: xr.Dataset) -> NDArray[np.float64]:
+    """What takes the place of time in a series: time, of states the key that varies where it does so steadily, else numbers."""
+    if "time" in data:
+        return np.asarray(data["time"].to_numpy(), dtype=np.float64)
+    for key in reversed(_varied(data)):
+        values = np.asarray(data[key].to_numpy(), dtype=np.float64)
+        steps = np.diff(values)
+        if (steps > 0.0).all() or (steps < 0.0).all():
+            return values
+    return np.arange(data.sizes["state"], dtype=np.float64)

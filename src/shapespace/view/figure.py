@@ -6,7 +6,6 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
@@ -34,7 +33,6 @@ class Layout:
     """What the figure of one scenario shows: the observable of the curve, a second one, and extras of the snapshots."""
 
     curve: str
-    words: str = ""
     twin: str | None = None
     with_swim: bool = False
     with_inset: bool = False
@@ -49,7 +47,7 @@ _LAYOUTS = {
     "membrane-protrusion": Layout("height", twin=panels.GROWTH),
     "ring-slipping": Layout("ring_position", twin="velocity", with_swim=True),
     "polar-swimmer": Layout("velocity", twin="polarity", with_swim=True),
-    "guided-division": Layout("equator_radius", words="neck radius", with_inset=True),
+    "guided-division": Layout("equator_radius", with_inset=True),
     "vesicle": Layout("bending_energy"),
 }
 _BY_MODEL = {"open-membrane": "membrane-protrusion", "vesicle": "vesicle"}
@@ -64,11 +62,11 @@ def layout_of(dataset: xr.Dataset) -> Layout:
     if (model := dataset.attrs.get("kind", dataset.attrs.get("model"))) in _BY_MODEL:
         return _LAYOUTS[_BY_MODEL[model]]
     curve = next((name for name in _GENERIC_CURVES if name in dataset), _GENERIC_CURVES[0])
-    swims = curve != "velocity" and _swims(dataset)
-    return Layout(curve, twin="velocity" if swims else None, with_swim=swims, with_inset=True)
+    is_swimmer = curve != "velocity" and swims(dataset)
+    return Layout(curve, twin="velocity" if is_swimmer else None, with_swim=is_swimmer, with_inset=True)
 
 
-def _swims(dataset: xr.Dataset) -> bool:
+def swims(dataset: xr.Dataset) -> bool:
     """Whether a surface moves along its axis at a speed that could be seen beside its flow."""
     if not {"velocity", "normal_velocity"} <= set(dataset.variables):
         return False
@@ -98,16 +96,16 @@ def _build(run: Run, layout: Layout, chosen: Sequence[int]) -> Figure:
     cell_mm = (style.WIDTH_MM - 18) / max(columns, 3)
     snapshots_mm = float(np.clip(cell_mm * (limits[3] - limits[2]) / (limits[1] - limits[0]), 18, 80)) + 13
     heights_mm = [48.0, snapshots_mm, 84.0 if layout.with_inset else 66.0]
-    figure = Figure(figsize=(style.WIDTH_MM * style.MM, sum(heights_mm) * style.MM), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = style.new_figure(1.0, sum(heights_mm))
     parts = figure.subfigures(3, 1, height_ratios=heights_mm, squeeze=False)
     top, middle, bottom = np.asarray(parts)[:, 0]
     curve = top.add_subplot()
-    panels.draw_curve(curve, run, layout.curve, layout.words, layout.twin, chosen)
+    panels.draw_curve(curve, run, layout.curve, layout.twin, chosen)
     curve.set_title("(a)", loc="left", fontweight="bold", fontsize=9)
     _draw_snapshots(middle, run, layout, profiles, cameras, limits)
     _draw_panels(bottom, run, layout, profiles)
     middle.suptitle("(b)", x=0.004, ha="left", fontweight="bold", fontsize=9)
+    panels.number_dots(curve, run, layout.curve, chosen)
     return figure
 
 
@@ -124,7 +122,7 @@ def _draw_panels(part: SubFigure, run: Run, layout: Layout, profiles: Sequence[P
     for axes in rows[0]:
         axes.tick_params(labelbottom=False)
     for axes in rows[1]:
-        axes.set_xlabel(style.axis_label(run.dataset["mesh_coordinate"]))
+        axes.set_xlabel(style.symbol_of(run.dataset["mesh_coordinate"]))
     if layout.with_inset:
         panels.draw_neck_inset(rows[1][-1], profiles[-1])
 
@@ -206,7 +204,7 @@ def draw_colour_bar(part: Figure | SubFigure, axes: Axes, run: Run, camera: Came
     """The scale of the regulator; an arrow on top says that a small region exceeds it."""
     bar = part.colorbar(camera.colours, cax=axes, extend="max" if camera.colours_exceed else "neither")
     if run.regulator:
-        bar.set_label(style.axis_label(run.dataset[run.regulator], words="regulator"))
+        bar.set_label(style.axis_label(run.dataset[run.regulator]))
     bar.outline.set_linewidth(0.6)
     return bar
 

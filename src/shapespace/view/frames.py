@@ -1,5 +1,6 @@
 """A stored run as checked arrays: one profile at any frame position, and the measure of progress along the run."""
 
+import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -8,6 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from shapespace.base.errors import InputError
+from shapespace.base.scales import Scales
 
 Array = NDArray[np.float64]
 
@@ -24,7 +26,6 @@ PROFILE_VARIABLES = (
 REGULATORS = {"closed-surface": "concentration", "open-membrane": "local_spontaneous_curvature"}
 _TIME_SHARE = 0.35  # weight of plain time beside shape change and curve change, each of weight 1
 _COMPARED_POINTS = 81
-_LEAST_FRAMES = 2
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,7 @@ class Run:
     swim: Array
     regulator: str | None
     is_open: bool
+    scales: Scales
 
     def profile(self, position: float) -> Profile:
         """The meridian at a frame position in [0, frames - 1]; between frames, linear at fixed u.
@@ -92,8 +94,8 @@ class Run:
         )
 
 
-def read_run(dataset: xr.Dataset, observables: Iterable[str] = ()) -> Run:
-    """The arrays of `dataset`, checked: at least 2 frames, time increases, all variables there and finite."""
+def read_run(dataset: xr.Dataset, observables: Iterable[str] = (), least: int = 2) -> Run:
+    """The arrays of `dataset`, checked: at least so many frames, time increases, all variables there and finite."""
     scenario = str(dataset.attrs.get("scenario", "unnamed"))
     model = str(dataset.attrs.get("kind", dataset.attrs.get("model", "")))
     observables = tuple(observables)
@@ -108,9 +110,9 @@ def read_run(dataset: xr.Dataset, observables: Iterable[str] = ()) -> Run:
     if regulator and regulator not in wanted:
         wanted.append(regulator)
     frames = dataset.sizes.get("time", 0)
-    if frames < _LEAST_FRAMES:
+    if frames < least:
         raise InputError(
-            f"dataset of scenario '{scenario}' has {frames} frame(s); its picture needs {_LEAST_FRAMES}: run it on."
+            f"dataset of scenario '{scenario}' has {frames} frame(s); its picture needs {least}: run it on."
         )
     for name in ("time", *wanted):
         dims = ("time",) if name == "time" or name in observables else ("time", "point")
@@ -127,7 +129,10 @@ def read_run(dataset: xr.Dataset, observables: Iterable[str] = ()) -> Run:
         if name not in observables
     }
     swim = observable(dataset, "velocity") if "velocity" in dataset else np.zeros_like(time)
-    return Run(dataset, time, fields, swim, regulator, model == "open-membrane")
+    parameters = json.loads(dataset.attrs.get("parameters", "{}"))
+    if not parameters:
+        raise InputError(f"dataset of scenario '{scenario}' lacks its parameters; pass the dataset of a stored run.")
+    return Run(dataset, time, fields, swim, regulator, model == "open-membrane", Scales.of(parameters))
 
 
 def observable(dataset: xr.Dataset, name: str) -> Array:

@@ -77,16 +77,19 @@ def _triangles(rings: int, is_closed: bool) -> NDArray[np.int64]:
     return np.concatenate(parts)
 
 
-def vtk_bytes(mesh: Mesh, units: Mapping[str, str], value: float) -> bytes:
-    """An XML PolyData file (.vtp): float32, compressed; the time or number of the state as TimeValue, units as a comment."""
-    told = ", ".join(f"{name} {unit}" for name, unit in units.items() if name in mesh.data)
+def vtk_bytes(mesh: Mesh, units: Mapping[str, str], time: float, numbers: Mapping[str, float]) -> bytes:
+    """An XML PolyData file (.vtp), compressed: fields in single precision, time as TimeValue and numbers as field data in double
+    precision, units as a comment. numbers: time, or the state's values of the keys that vary.
+    """
+    told = ", ".join(f"{name} {unit}" for name, unit in units.items() if name in mesh.data or name in numbers)
+    about = "".join(_number(name, value) for name, value in {"TimeValue": time, **numbers}.items())
     count = len(mesh.triangles)
     data = "".join(_data_array(values.astype("<f4"), name) for name, values in mesh.data.items())
     return f"""<?xml version="1.0"?>
 <!-- units: points {units.get("radius", "")}, {told} -->
 <VTKFile type="PolyData" version="1.0" byte_order="LittleEndian" header_type="UInt64" compressor="vtkZLibDataCompressor">
 <PolyData>
-<FieldData>{_data_array(np.array([value], dtype="<f8"), "TimeValue", 'NumberOfTuples="1"')}</FieldData>
+<FieldData>{about}</FieldData>
 <Piece NumberOfPoints="{len(mesh.points)}" NumberOfPolys="{count}">
 <PointData Normals="normal">{data}</PointData>
 <Points>{_data_array(mesh.points.astype("<f4"), "points")}</Points>
@@ -96,6 +99,10 @@ def vtk_bytes(mesh: Mesh, units: Mapping[str, str], value: float) -> bytes:
 </PolyData>
 </VTKFile>
 """.encode()
+
+
+def _number(name: str, value: float) -> str:
+    return _data_array(np.array([value], dtype="<f8"), name, 'NumberOfTuples="1"')
 
 
 def _data_array(values: NDArray[np.generic], name: str, more: str = "") -> str:
@@ -116,8 +123,10 @@ def vtk_series(files: Mapping[str, float]) -> bytes:
     return f"{head}{entries}</Collection>\n</VTKFile>\n".encode()
 
 
-def ply_bytes(mesh: Mesh, kind: str, span: tuple[float, float]) -> bytes:
-    """A binary PLY file: points, normals, colours of the regulator or coat over `span`, and every field as a property."""
+def ply_bytes(mesh: Mesh, kind: str, span: tuple[float, float], numbers: Mapping[str, float]) -> bytes:
+    """A binary PLY file: points, normals, colours of the regulator or coat over `span`, and every field as a property; numbers
+    of the state as comments.
+    """
     carried = REGULATORS.get(kind, "")
     scalars = {name: values for name, values in mesh.data.items() if values.ndim == 1}
     low, high = span
@@ -136,6 +145,11 @@ def ply_bytes(mesh: Mesh, kind: str, span: tuple[float, float]) -> bytes:
     faces = np.empty(len(mesh.triangles), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     faces["count"], faces["corners"] = 3, mesh.triangles
     properties = [f"property {'float' if form == '<f4' else 'uchar'} {name}" for name, form in kinds]
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(vertices)}", *properties]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        *(f"comment {name} {value!r}" for name, value in numbers.items()),
+    ]
+    header += [f"element vertex {len(vertices)}", *properties]
     header += [f"element face {len(faces)}", "property list uchar int vertex_indices", "end_header", ""]
     return "\n".join(header).encode() + vertices.tobytes() + faces.tobytes()

@@ -2,9 +2,9 @@
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from shapespace.base.scales import Scales
 from shapespace.study.modes import CRITICAL, ModeProfiles, Modes
 from shapespace.view import style
 
@@ -18,11 +18,10 @@ def plot_mode(modes: Modes, index: int) -> Figure:
     """Mode number `index`, 0 being the leading one; of a pair the real part."""
     profiles = modes.profiles(index)
     with style.house_style():
-        figure = Figure(figsize=(style.WIDTH_MM * style.MM, HEIGHT_MM * style.MM), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = style.new_figure(1.0, HEIGHT_MM)
         outline, curves = figure.subplots(1, 2, width_ratios=(1.0, 1.1))
         _draw_outline(outline, modes, profiles)
-        _draw_profiles(curves, profiles)
+        _draw_profiles(curves, profiles, modes.scenario.scales)
         figure.suptitle(_title(modes, index), fontsize=8.5)
     return figure
 
@@ -54,26 +53,25 @@ def _draw_outline(axes: Axes, modes: Modes, at: ModeProfiles) -> None:
                 color=style.GREEN, angles="xy", scale_units="xy", scale=1.0, width=0.005, zorder=4,
             )  # fmt: skip
     axes.set_aspect("equal")
-    length_unit = style.math_units(modes.scenario.scales.unit("length"))
-    axes.set_xlabel(" ".join(filter(None, ["r", f"({length_unit})" if length_unit else ""])))
-    axes.set_ylabel(" ".join(filter(None, ["z", f"({length_unit})" if length_unit else ""])))
+    axes.set_xlabel(style.quantity_label(modes.scenario.scales, "radius"))
+    axes.set_ylabel(style.quantity_label(modes.scenario.scales, "axial_position"))
     axes.margins(0.12)
     axes.plot([], [], color=style.GREEN, label="velocity of the mode")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
 
 
-def _draw_profiles(axes: Axes, at: ModeProfiles) -> None:
+def _draw_profiles(axes: Axes, at: ModeProfiles, scales: Scales) -> None:
     """Each relative to its own largest value; what is zero throughout is left out."""
     curves = {
         "normal displacement": (at.displacement.real, style.RED),
         "tangential velocity": (at.tangential.real, style.GREEN),
-        "regulator concentration": (None if at.regulator is None else at.regulator.real, style.PURPLE),
+        "concentration": (None if at.regulator is None else at.regulator.real, style.PURPLE),
     }
     axes.axhline(0.0, color=style.FAINT, linewidth=0.6)
     for word, (values, colour) in curves.items():
         if values is not None and np.abs(values).max() > 1e-9 * _largest(at):
             axes.plot(at.u, values / np.abs(values).max(), color=colour, label=word)
-    axes.set_xlabel("mesh coordinate $u$")
+    axes.set_xlabel(style.quantity_label(scales, "mesh_coordinate"))
     axes.set_ylabel("change, relative to its largest")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
 

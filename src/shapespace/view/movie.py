@@ -25,6 +25,7 @@ from matplotlib.text import Text
 from numpy.typing import NDArray
 
 from shapespace.base.errors import InputError, StoreError
+from shapespace.study.tables import VARIED
 from shapespace.view import panels, style
 from shapespace.view.figure import (
     Layout,
@@ -157,6 +158,11 @@ class Scene:
         self._colour = panels.colour_of(layout.curve)
         self._early = panels.early_time(self._run, curve)
         self._values = np.interp(positions, np.arange(curve.size), curve)
+        # Where arclength takes the place of time, the key is shown as well.
+        varied = str(dataset.attrs.get(VARIED, ""))
+        self._varied = varied if varied and varied != dataset["time"].attrs.get("words") else None
+        if self._varied is not None:
+            self._keys = np.interp(positions, np.arange(curve.size), observable(dataset, self._varied))
         self._camera = make_camera(self._run, self._profiles, arrow_width=1.6 / 72)
         self._swims = layout.with_swim and self._camera.swim_scale > 0
         self._flows = _smoothed(arrow_flows(self._profiles, self._camera, rest=1e-3, ignored=0.3))
@@ -182,10 +188,13 @@ class Scene:
         elif run.regulator:
             draw_colour_bar(still, still.add_axes((0.485, 0.16, 0.013, 0.68)), run, camera)
         curve = still.add_axes((_CLOCKS_LEFT, 0.15, 0.235 if layout.twin else 0.305, 0.54))
-        panels.draw_curve(curve, run, layout.curve, layout.words, layout.twin, [])
-        self._clocks = [Clock(still, self.figure, run.dataset["time"], 0.88, 17, style.INK, self._early)]
+        panels.draw_curve(curve, run, layout.curve, layout.twin, [])
+        self._clocks = [Clock(still, self.figure, run.dataset["time"], 0.9, 17, style.INK, self._early)]
+        if self._varied is not None:
+            self._clocks.append(Clock(still, self.figure, run.dataset[self._varied], 0.82, 13, style.INK))
         if self._swims:
-            self._clocks.append(Clock(still, self.figure, run.dataset["velocity"], 0.79, 13, style.GREEN))
+            y = 0.82 if self._varied is None else 0.75
+            self._clocks.append(Clock(still, self.figure, run.dataset["velocity"], y, 13, style.GREEN))
         self.figure.add_artist(Backdrop(_pixels(still)))
         return curve
 
@@ -220,7 +229,8 @@ class Scene:
         profile = self._profiles[k]
         self._artists.show(profile, offset_of(self._camera, profile), float(self._flows[k]))
         self._dot.set_data(*self._dots[k : k + 1].T)
-        for clock, value in zip(self._clocks, (profile.time, profile.swim), strict=False):
+        values = [profile.time, *([] if self._varied is None else [float(self._keys[k])]), profile.swim]
+        for clock, value in zip(self._clocks, values, strict=False):
             clock.show(value)
         if self._ruler is not None:
             self._ruler.show(profile.centre)
@@ -278,7 +288,8 @@ class Clock:
         span = least or 0.01 * float(np.abs(values).max()) or 1.0  # what two or more digits should show
         self._decimals = max(0, -int(np.floor(np.log10(span))))
         shared: dict[str, Any] = {"fontsize": size, "color": colour, "va": "baseline"}
-        left = still.text(_CLOCKS_LEFT, y, f"{style.symbol_of(variable)} = ", ha="left", **shared)
+        self.symbol = f"{style.symbol_of(variable)} = "
+        left = still.text(_CLOCKS_LEFT, y, self.symbol, ha="left", **shared)
         widest = max((style.fixed(float(v), self._decimals) for v in (values.min(), values.max())), key=len)
         probe = still.text(0, 0, widest, **shared)
         page = float(still.bbox.width)

@@ -1,6 +1,7 @@
 """Results in notebooks: a page of what they say of themselves, their figure, and movies. Importing it makes it the presenter."""
 
 from base64 import b64encode
+from collections.abc import Callable
 from html import escape
 from io import BytesIO
 from pathlib import Path
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from shapespace.base.errors import InputError
 from shapespace.study.files import storage, write_atomically
 from shapespace.study.presenting import AbstractAnimation, AbstractPresenter, Presented, Summary, Table
+from shapespace.view.typeset import html_of, symbol_tex, units_tex
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -102,9 +104,20 @@ def _folded(title: str, table: Table, is_open: bool) -> str:
 
 
 def _table(table: Table) -> str:
+    """Columns of symbols and units are typeset, as in figures."""
+    typeset = [_TYPESET.get(text, escape) for text in table[0]]
     head = "".join(f"<th style='{_CELL}'>{escape(text)}</th>" for text in table[0]) if any(table[0]) else ""
-    lines = ("".join(f"<td style='{_CELL}'>{escape(text)}</td>" for text in row) for row in table[1:])
+    lines = (
+        "".join(f"<td style='{_CELL}'>{cell(text)}</td>" for cell, text in zip(typeset, row, strict=True))
+        for row in table[1:]
+    )
     return f"<table>{f'<tr>{head}</tr>' if head else ''}{''.join(f'<tr>{line}</tr>' for line in lines)}</table>"
 
+
+_TYPESET: dict[str, Callable[[str], str]] = {
+    "symbol": lambda text: html_of(symbol_tex(text)),
+    "unit": lambda text: html_of(units_tex(text)),
+}
+"""How the cells below a heading are written."""
 
 Presented.presenter = Notebook()

@@ -4,11 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FixedLocator, MaxNLocator, NullLocator
+from matplotlib.ticker import MaxNLocator, NullLocator
 
-from shapespace.view import style
+from shapespace.study.telling import LEAST_CHANGE
+from shapespace.view import limits, style
 from shapespace.view.frames import Array, Profile, Run, observable, progress_measure
+from shapespace.view.labels import label_points
 
 GROWTH = "growth speed"  # not an observable: the normal velocity of the apex
 _OWN_SCALE_FACTOR = {"velocity": 10.0, "curvature": 4.0}  # between the ranges of a row: more, and each has its own
@@ -21,18 +22,17 @@ VELOCITIES = (("tangential_velocity", style.RED, "-"), ("normal_velocity", style
 CURVATURES = (("azimuthal_curvature", style.PURPLE, "-"), ("meridional_curvature", style.ORANGE, (0, (4, 1.2))))
 
 
-def draw_curve(axes: Axes, run: Run, name: str, words: str, twin: str | None, marked: Sequence[int]) -> None:
-    """An observable over time, numbered dots at the `marked` frames, and a second series on the right axis."""
+def draw_curve(axes: Axes, run: Run, name: str, twin: str | None, marked: Sequence[int]) -> None:
+    """An observable over time, dots at the `marked` frames, and a second series on the right axis."""
     values, colour = observable(run.dataset, name), colour_of(name)
     axes.plot(run.time, values, color=colour, zorder=3)
     axes.plot(run.time[marked], values[marked], "o", color=colour, markersize=4, markeredgecolor="white", zorder=4)
-    axes.set_xlabel(style.axis_label(run.dataset["time"], words=run.dataset["time"].attrs.get("words", "time")))
-    axes.set_ylabel(style.axis_label(run.dataset[name], words=words or words_of(name)), color=colour)
+    axes.set_xlabel(style.axis_label(run.dataset["time"]))
+    axes.set_ylabel(style.axis_label(run.dataset[name]), color=colour)
     axes.tick_params(axis="y", labelcolor=colour)
     _scale_time(axes, run, values)
-    axes.margins(x=0.015, y=0.12)
-    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
-    _number_dots(axes, run.time, values, marked, colour)
+    axes.margins(x=0.015)
+    _scale_values(axes, values, run.scales.factor(name))
     if twin is not None:
         _draw_twin(axes, run, twin, early_time(run, values))
 
@@ -42,26 +42,19 @@ def colour_of(name: str) -> str:
     return {GROWTH: style.RED, "velocity": style.GREEN}.get(name, style.BLUE)
 
 
-def words_of(name: str) -> str:
-    """An observable in words."""
-    return "swimming speed" if name == "velocity" else name.replace("_", " ")
+def _scale_values(axes: Axes, values: Array, scale: float) -> None:
+    """The y axis of a series, whose round-off is not magnified."""
+    low, high = limits.not_magnified(float(np.nanmin(values)), float(np.nanmax(values)), scale)
+    axes.set_ylim(low - 0.12 * (high - low), high + 0.12 * (high - low))
+    axes.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
 
 
 def _scale_time(axes: Axes, run: Run, values: Array) -> None:
     """Logarithmic time, linear near 0, where most of the change takes up too small a part of a linear axis."""
     early = early_time(run, values)
     if early > 0:
-        scale_logarithmically(axes, early, run.time[-1])
-
-
-def scale_logarithmically(axes: Axes, early: float, late: float) -> None:
-    """A logarithmic axis of time up to `late`, linear from 0 to `early`, with as many ticks as there is room for."""
-    axes.set_xscale("symlog", linthresh=early, linscale=0.6)
-    inches = axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
-    room = max(2, int(inches / 0.65))  # for tick labels
-    first, last = (int(np.floor(np.log10(t) + 1e-9)) for t in (early, late))
-    powers = range(last, first - 1, -max(1, int(np.ceil((last - first + 1) / room))))
-    axes.xaxis.set_major_locator(FixedLocator([0.0, *(10.0**p for p in powers)]))
+        inches = axes.get_position().width * axes.figure.bbox.width / axes.figure.dpi
+        limits.scale_by_powers(axes, "x", early, (0.0, run.time[-1]), room=0.45 / inches)
 
 
 def early_time(run: Run, values: Array) -> float:
@@ -73,35 +66,11 @@ def early_time(run: Run, values: Array) -> float:
     return float(10.0 ** np.floor(np.log10(first)))
 
 
-def _number_dots(axes: Axes, time: Array, values: Array, marked: Sequence[int], colour: str) -> None:
-    """Numbers beside the dots, on the side away from the curve's bend: above where it is concave, else below."""
-    close = 0.02  # of the width: the number of the dot before would be in the way
-    span = float(np.ptp(values)) or 1.0
-    place = axes.transScale.transform(np.stack([time, values], -1))[:, 0]
-    width = float(place[-1] - place[0])
-    for number, k in enumerate(marked, start=1):
-        before, after = (np.interp(place[k] + side * 0.02 * width, place, values) for side in (-1, 1))
-        slope = (after - before) / span / 0.04 * 0.25  # on the page, axes about four times as wide as high
-        normal = np.array([-slope, 1.0]) / np.hypot(slope, 1.0)
-        at_end = k in (0, time.size - 1)
-        bend = 1.0 if at_end or values[k] >= 0.5 * (before + after) - 1e-3 * span else -1.0
-        if abs(slope) > 1:  # steep: always to the right
-            bend = 1.0 if normal[0] > 0 else -1.0
-        elif number > 1 and place[k] - place[marked[number - 2]] < close * width and not at_end:
-            bend = -bend
-        label = axes.annotate(
-            str(number),
-            (time[k], values[k]),
-            xytext=7.5 * bend * normal,
-            textcoords="offset points",
-            ha="center",
-            va="center",
-            fontweight="bold",
-            color=colour,
-            fontsize=8,
-            zorder=5,
-        )
-        label.set_path_effects([withStroke(linewidth=2, foreground="white")])
+def number_dots(axes: Axes, run: Run, name: str, marked: Sequence[int]) -> None:
+    """Numbers beside the dots of `draw_curve`; to be called last."""
+    values = observable(run.dataset, name)
+    labels = [(str(number), run.time[k], values[k]) for number, k in enumerate(marked, start=1)]
+    label_points(axes, labels, fontsize=8, fontweight="bold", color=colour_of(name))
 
 
 def _draw_twin(axes: Axes, run: Run, twin: str, early: float) -> None:
@@ -113,18 +82,17 @@ def _draw_twin(axes: Axes, run: Run, twin: str, early: float) -> None:
         text = f"growth speed ({style.units_of(run.dataset['normal_velocity'])})"
     else:
         values = observable(run.dataset, twin)
-        text = style.axis_label(run.dataset[twin], words=words_of(twin))
+        text = style.axis_label(run.dataset[twin])
     colour = colour_of(twin)
     right.plot(run.time, values, color=colour, linestyle=(0, (4, 1.2)), zorder=2)
     right.set_ylabel(text, color=colour)
     right.tick_params(axis="y", labelcolor=colour)
-    right.margins(y=0.12)
     if twin == GROWTH and early > 0 and values.max() == np.abs(values).max() > 0:
         right.set_yscale("log", nonpositive="mask")
         right.set_ylim(_LEAST_GROWTH * values.max(), 2.0 * values.max())
         right.yaxis.set_minor_locator(NullLocator())
     else:
-        right.yaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 2.5, 5, 10]))
+        _scale_values(right, values, run.scales.factor("normal_velocity" if twin == GROWTH else twin))
     axes.set_zorder(right.get_zorder() + 1)
     axes.patch.set_visible(False)
 
@@ -144,9 +112,10 @@ def draw_profiles(
     size = float(run.fields["radius"].max())
     least, rest = (1.0 / size, 0.0) if words == "curvature" else (0.0, _REST)
     ranges = [_range(profile, variables, least) for profile in profiles]
-    common = min(low for low, _ in ranges), max(high for _, high in ranges)
+    scale = run.scales.factor(variables[0][0])
+    common = limits.not_magnified(min(low for low, _ in ranges), max(high for _, high in ranges), scale)
     widths = np.array([high - low for low, high in ranges])
-    seen = widths > rest * widths.max()
+    seen = widths > max(rest * widths.max(), LEAST_CHANGE * scale)
     apart = bool(seen.any()) and widths.max() > _OWN_SCALE_FACTOR[words] * widths[seen].min()
     for k, (axes, (low, high)) in enumerate(zip(row, ranges, strict=True)):
         if not apart:

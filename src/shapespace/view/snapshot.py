@@ -17,6 +17,7 @@ from matplotlib.quiver import Quiver
 from matplotlib.tri import Triangulation
 from numpy.typing import NDArray
 
+from shapespace.study.telling import LEAST_CHANGE
 from shapespace.view import style
 from shapespace.view.frames import Array, Profile, Run
 
@@ -101,7 +102,7 @@ def make_camera(run: Run, profiles: Sequence[Profile], arrow_width: float = 1.15
     fastest = max(fastest_flow(p, run.is_open) for p in profiles)
     swim = max(abs(p.swim) for p in profiles)
     # Round-off is not a flow, and a surface that stays where it is does not swim.
-    rest = 1e-9 * size / float(run.time[-1] - run.time[0])
+    rest = LEAST_CHANGE * run.scales.factor("velocity")
     swims = swim > max(rest, 1e-3 * fastest)
     camera = Camera(
         elevation=float(np.deg2rad(24.0 if run.is_open else 8.0)),

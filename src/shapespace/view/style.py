@@ -1,6 +1,5 @@
 """Colours, sizes and the typesetting of symbols and units: the only place where a picture's looks are chosen."""
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
@@ -10,26 +9,32 @@ import matplotlib as mpl
 import matplotlib.style
 import numpy as np
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import Colormap, LinearSegmentedColormap
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.mathtext import MathTextParser
 
-from shapespace.base.units import with_micro
+from shapespace.base.scales import QUANTITIES, Scales
+from shapespace.view.typeset import symbol_tex, units_tex
 
 WIDTH_MM = 180.0
 MM = 1 / 25.4  # inches
 
 BLUE = "#0067A5"
-RED = "#D81E2C"
-GREEN = "#00894F"
-PURPLE = "#6A3D9A"
+RED = "#BE1622"
+GREEN = "#00A06A"
+PURPLE = "#A3668F"
 ORANGE = "#E07B00"
 INK = "#222222"
 FAINT = "#B8BDC4"
 MEMBRANE = "#C3CAD3"
 COAT = "#F5C518"
 GREY = "#A9A9B0"
-REGIMES = ("#BFD9EC", "#F6D5A6", GREY, "#CDE5C4", "#DCCBE8", "#F2C4C0", "#F3EBAE", "#93C7C2")
-"""Of regions, so pale that lines show on them, and of different lightness."""
+LINES = (BLUE, ORANGE, PURPLE, GREEN, RED, INK)
+"""Of lines, in this order where nothing else tells which; told apart also by those who do not tell red from green."""
+REGIMES = ("#C6D9FC", "#EED790", "#8AA18E", "#FBEDC7", "#9CB5F7", "#9C9F5D", "#CAC9CB", "#A395B9")
+"""Of regions, so pale that lines show on them; told apart as the lines are."""
 
 _RC: dict[Any, Any] = {
     "font.family": ["sans-serif"],
@@ -60,13 +65,6 @@ _RC: dict[Any, Any] = {
     "savefig.facecolor": "white",
 }
 
-_GREEK = (
-    "alpha|beta|gamma|delta|epsilon|zeta|eta|theta|kappa|lambda|mu|nu|xi|pi|rho|sigma|tau|phi|chi|psi|omega|"
-    "Gamma|Delta|Theta|Lambda|Xi|Pi|Sigma|Phi|Psi|Omega"
-)
-_GREEK_WORD = re.compile(rf"(?<![A-Za-z\\])({_GREEK})(?![A-Za-z])")
-_UNIT_TOKEN = re.compile(r"(?P<name>[^\W\d_]+)(?P<index>_\w+|\d+)?(?:(?:\*\*|\^)?(?P<power>[-+]?\d+))?|(?P<other>\S)")
-
 
 @contextmanager
 def house_style(scale: float = 1.0) -> Iterator[None]:
@@ -74,6 +72,21 @@ def house_style(scale: float = 1.0) -> Iterator[None]:
     type_sizes = {key: value * scale for key, value in _RC.items() if key.endswith("size") and isinstance(value, float)}
     with mpl.style.context(["default", _RC | type_sizes]):
         yield
+
+
+class Settled(ConstrainedLayoutEngine):
+    """Constrained layout that looks twice: axes of another size have other ticks, whose labels need other room."""
+
+    def execute(self, fig: Any) -> None:
+        for _ in range(2):
+            super().execute(fig)
+
+
+def new_figure(width: float, height_mm: float) -> Figure:
+    """An empty figure that is laid out as it is drawn; width: as a part of the page's."""
+    figure = Figure(figsize=(width * WIDTH_MM * MM, height_mm * MM), layout=Settled())
+    FigureCanvasAgg(figure)
+    return figure
 
 
 @cache
@@ -96,10 +109,6 @@ def coat_map() -> Colormap:
     return LinearSegmentedColormap.from_list("shapespace_coat", [MEMBRANE, COAT], N=256)
 
 
-def _greek(text: str) -> str:
-    return _GREEK_WORD.sub(r"\\\1", text)
-
-
 @cache
 def _is_math(text: str) -> bool:
     """Whether mathtext can set `text`: labels come from files, and a bad one would only fail when drawn."""
@@ -113,9 +122,7 @@ def _is_math(text: str) -> bool:
 def math_symbol(symbol: str) -> str:
     """A symbol as stored (`v_u`, `C_phi^phi`, TeX, or a plain word) as mathtext, or as plain text if that fails."""
     bare = symbol.strip().strip("$")
-    indexed = re.sub(r"(?<![A-Za-z0-9_^{\\])([A-Za-z])(\d+)", r"\1_{\2}", bare)
-    braced = re.sub(r"([_^])([A-Za-z0-9]{2,})", r"\1{\2}", indexed)
-    for text in (f"${_greek(braced)}$", f"${bare}$"):
+    for text in (f"${symbol_tex(symbol)}$", f"${bare}$"):
         if bare and _is_math(text):
             return text
     return symbol.replace("$", "")
@@ -123,29 +130,15 @@ def math_symbol(symbol: str) -> str:
 
 def math_units(units: str) -> str:
     """Units as stored (`R0/tau`, `1/R0`, `um/s`) as mathtext; empty for dimensionless ones."""
-    if units.strip() in ("", "1", "dimensionless"):
-        return ""
-
-    def token(match: re.Match[str]) -> str:
-        if match["other"]:
-            return {"*": r"\,"}.get(match["other"], match["other"])
-        name, index = match["name"], (match["index"] or "").lstrip("_")
-        if name == "Rb":
-            name, index = "R", "b"
-        is_greek = _GREEK_WORD.fullmatch(name) is not None
-        text = f"\\{name}" if is_greek else name if index else rf"\mathrm{{{name}}}"
-        return text + (f"_{{{_greek(index)}}}" if index else "") + (f"^{{{match['power']}}}" if match["power"] else "")
-
-    # Mathtext drops blanks.
-    apart = re.sub(r"(?<=\w) (?=\w)", "*", with_micro(units))
-    text = "$" + _UNIT_TOKEN.sub(token, apart) + "$"
-    return text if _is_math(text) else units.replace("$", "")
+    tex = units_tex(units)
+    text = f"${tex}$" if tex else ""
+    return text if not tex or _is_math(text) else units.replace("$", "")
 
 
 def symbol_of(variable: xr.DataArray) -> str:
     """The typeset symbol of a variable; its name in words where none is stored."""
     symbol = str(variable.attrs.get("symbol", ""))
-    return math_symbol(symbol) if symbol else str(variable.name).replace("_", " ")
+    return math_symbol(symbol) if symbol else words_of(str(variable.name))
 
 
 def units_of(variable: xr.DataArray) -> str:
@@ -153,11 +146,28 @@ def units_of(variable: xr.DataArray) -> str:
     return math_units(str(variable.attrs.get("units", "")))
 
 
-def axis_label(*variables: xr.DataArray, words: str = "") -> str:
-    """`words symbols (units)` of variables that share one axis."""
-    symbols = ", ".join(symbol_of(v) for v in variables if v.attrs.get("symbol") or not words)
-    units = units_of(variables[0])
-    return " ".join(part for part in (words, symbols, f"({units})" if units else "") if part)
+def words_of(name: str) -> str:
+    """The name of a quantity in words, a name of a person as that."""
+    return "Péclet number" if name == "peclet" else name.replace("_", " ")
+
+
+def axis_label(variable: xr.DataArray) -> str:
+    """`words symbol (units)` of a variable; words: its name, or the attribute of that name."""
+    units = units_of(variable)
+    symbol = math_symbol(str(variable.attrs.get("symbol", "")))
+    words = words_of(str(variable.attrs.get("words", variable.name)))
+    return " ".join(part for part in (words, symbol, f"({units})" if units else "") if part)
+
+
+def quantity_label(scales: Scales, name: str) -> str:
+    """Words, symbol and unit of a key, an observable or a field in the units of a scenario, for an axis."""
+    attributes = {"symbol": QUANTITIES[name].symbol, "units": scales.unit(name)}
+    return axis_label(xr.DataArray(0.0, name=name, attrs=attributes))
+
+
+def quantity_value(scales: Scales, name: str, value: float, form: str = "g") -> str:
+    """`symbol = value unit` of such a quantity."""
+    return f"{math_symbol(QUANTITIES[name].symbol)} = {value:{form}} {math_units(scales.unit(name))}".rstrip()
 
 
 def time_stamps(times: Sequence[float], symbol: str, units: str) -> list[str]:

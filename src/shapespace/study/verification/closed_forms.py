@@ -71,6 +71,11 @@ def polar_onset(saturation: float, exchange: float) -> float:
     return (2.0 + exchange) / slope
 
 
+def swimming_speed(v: Mapping[str, float], pattern: float) -> float:
+    """-(R/2) (xi Delta mu)_0 f'(c0) dc/eta_b: the speed of a sphere with c = c0 + dc cos(theta)."""
+    return -0.5 * v["sphere_radius"] * active_tension(v)[1] * pattern / v["bulk_viscosity"]
+
+
 def buckling_tension(radius: float = 1.0, rigidity: float = 1.0) -> float:
     """-j_{1,1}^2 kappa/R_b^2 = -14.681970642: the clamped fluid disc buckles."""
     return -float(jn_zeros(1, 1)[0] ** 2) * rigidity / radius**2
@@ -85,6 +90,11 @@ def point_response(tension: float, radius: float = 1.0, rigidity: float = 1.0) -
     return float((-np.log(2.0) + np.euler_gamma + np.log(x) + k0(x) - b * (i0(x) - 1.0)) / (2.0 * np.pi * tension))
 
 
-def tether_force(tension: float, rigidity: float = 1.0) -> float:
-    """2 pi sqrt(2 kappa gamma): the pull on a long tube."""
-    return float(2.0 * np.pi * np.sqrt(2.0 * rigidity * tension))
+def tube_radius(tension: float, curvature: float = 0.0, rigidity: float = 1.0) -> float:
+    """1/sqrt(C0^2 + 2 gamma/kappa): of a long tube, bare or coated."""
+    return float(1.0 / np.sqrt(curvature**2 + 2.0 * tension / rigidity))
+
+
+def tether_force(tension: float, curvature: float = 0.0, rigidity: float = 1.0) -> float:
+    """2 pi kappa (sqrt(C0^2 + 2 gamma/kappa) - C0): the pull on a long tube."""
+    return float(2.0 * np.pi * rigidity * (1.0 / tube_radius(tension, curvature, rigidity) - curvature))

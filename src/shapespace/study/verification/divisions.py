@@ -3,8 +3,10 @@
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from shapespace.study.branching import branch
+from shapespace.study.engine import Engine
 from shapespace.study.run import run
 from shapespace.study.scenario import scenario
 from shapespace.study.steady import steady
@@ -31,6 +33,11 @@ def neck() -> Iterator[Row]:
     source = "the same with degree 5, 80 elements"
     for key, tolerance in (("neck_radius", 1e-6), ("pressure", 1e-6), ("height", 1e-6)):
         yield Row(key.replace("_", " "), usual.observables[key], finer.observables[key], source, tolerance)
+    seen = usual.observables
+    decay = seen["amount"] * Engine.of(usual.scenario).values["turnover_rate"]
+    yield Row(
+        "regulator: what flows in less what decays, of that", seen["amount_supply"] / decay, 0.0, "conserved", 1e-7
+    )
 
 
 def gibbs_loop() -> Iterator[Row]:
@@ -47,6 +54,7 @@ def gibbs_loop() -> Iterator[Row]:
 def balances() -> Iterator[Row]:
     """A surface that begins to divide: enclosed volume, and energy against dissipation and power, over the run."""
     done = run(scenario("guided-division", until=0.05))
+    assert done.outcome is not None
     if not done.outcome.is_success:
         raise Absent(f"{done.outcome}: {done.outcome.advice}")
     frames = done.frames[1:]
@@ -57,3 +65,13 @@ def balances() -> Iterator[Row]:
         for name in ("energy_residual", "dissipation")
     )
     yield Row("energy not accounted for, of that dissipated", lost / spent, 0.0, "first and second law", 1e-3)
+    times, supplies = zip(*((frame.time, frame.observables["amount_supply"]) for frame in frames), strict=True)
+    gained = float(CubicSpline(times, supplies).integrate(times[0], times[-1]))
+    amounts = [frame.observables["amount"] for frame in frames]
+    yield Row(
+        "regulator: gain over its exchange, integrated", (amounts[-1] - amounts[0]) / gained, 1.0, "conserved", 1e-3
+    )
+    closed = run(scenario("guided-division", turnover_rate=0.0, peclet=20.0, until=0.05)).frames
+    first = closed[0].observables["amount"]
+    worst = max((frame.observables["amount"] for frame in closed), key=lambda amount: abs(amount - first))
+    yield Row("regulator without turnover, worst of all steps, of the first", worst / first, 1.0, "conserved", 1e-9)

@@ -5,15 +5,20 @@ from collections.abc import Iterator
 import numpy as np
 
 from shapespace.study.branching import branch
+from shapespace.study.dataset import profile_of
 from shapespace.study.scenario import scenario
 from shapespace.study.steady import Steady, follow, steady
-from shapespace.study.verification.closed_forms import buckling_tension, point_response, tether_force
+from shapespace.study.verification.closed_forms import buckling_tension, point_response, tether_force, tube_radius
 from shapespace.study.verification.record import Row
 from shapespace.study.verification.states import Absent, found_state, special_point
 
 FORM = "closed form"
 SEIFERT = "Seifert, Berndl & Lipowsky 1991, two digits"
 BALL = 4.0 * np.pi / 3.0
+COATED = 2.0
+"""C0 R_b of the coated tube."""
+THROUGHOUT = 10.0
+"""Area of the coat over 2 pi, more than any of these surfaces has."""
 
 
 def buckling() -> Iterator[Row]:
@@ -37,10 +42,19 @@ def pull() -> Iterator[Row]:
 
 
 def tether() -> Iterator[Row]:
-    """A long tube under a prescribed height; what the ends add dies away exponentially."""
-    case = scenario("membrane-protrusion", spontaneous_curvature=0.0, boundary_tension=12.5)
-    held = branch(case, "height", 4.0, start=0.5, free="pulling_force", stability=False)
-    yield Row("plateau of the force", special_point(held, "end").value, tether_force(12.5), f"{FORM}, long tube", 1e-6)
+    """Long tubes under a prescribed height, bare and coated throughout; what the ends add dies away exponentially."""
+    source = f"{FORM}, long tube"
+    for name, curvature in (("bare", 0.0), ("coated", COATED)):
+        case = scenario(
+            "membrane-protrusion", spontaneous_curvature=curvature, boundary_tension=12.5, coat_area=THROUGHOUT,
+        )  # fmt: skip
+        held = branch(case, "height", 8.0, start=0.5, free="pulling_force", stability=False)
+        end = special_point(held, "end")
+        profile = profile_of(held.scenario_at(end), end.frame)
+        half = 0.5 * profile["axial_position"][0]
+        radius = np.interp(-half, -profile["axial_position"], profile["radius"])
+        yield Row(f"{name} tube: plateau of the force", end.value, tether_force(12.5, curvature), source, 1e-6)
+        yield Row(f"{name} tube: radius half way up", float(radius), tube_radius(12.5, curvature), source, 1e-5)
 
 
 def crossings() -> Iterator[Row]:

@@ -2,20 +2,28 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
+from shapespace.numerics.gauss import gauss_rule
 from shapespace.study.branching import branch
+from shapespace.study.dataset import profile_of
 from shapespace.study.engine import Engine
 from shapespace.study.scenario import Scenario, scenario
-from shapespace.study.steady import steady
+from shapespace.study.steady import Steady, steady
 from shapespace.study.verification.closed_forms import (
     polar_onset,
     pressure,
     sphere_energy,
     sphere_rates,
+    swimming_speed,
 )
 from shapespace.study.verification.record import Row
-from shapespace.study.verification.states import found_state, special_point
+from shapespace.study.verification.states import Absent, found_state, special_point
 
 FORM = "closed form"
+OUYANG = "Ou-Yang & Helfrich 1987, closed form"
+QUADRATURE = 8
+"""Gauss points on each element."""
 
 
 def resting(spontaneous_curvature: float = 2.0, tension: float = -0.5) -> Iterator[Row]:
@@ -62,6 +70,54 @@ def polarization() -> Iterator[Row]:
     found = branch(case, "peclet", 2410.0, start=2390.0, state="trivial", stability=False)
     fork = special_point(found, "pitchfork")
     yield Row("Pe* of the pitchfork, c_s = 10 c0, k = 45", fork.parameter, polar_onset(10.0, 45.0), FORM, 1e-9)
+
+
+def swimming() -> Iterator[Row]:
+    """Just beyond its onset, and far from it.
+
+    With c = c0 + dc cos(theta) the speed is -(R/2) (xi Delta mu)_0 f'(c0) dc/eta_b; what else there is goes with dc^2, and is
+    removed by two states. The friction force along the axis, of the flow and the motion together, vanishes at any amplitude.
+    """
+    ratios, squares = [], []
+    for peclet in (22.01, 22.04):
+        state = found_state(steady(scenario("polar-swimmer", peclet=peclet)))
+        values = Engine.of(state.scenario).values
+        c = profile_of(state.scenario, state.frame)["concentration"]
+        pattern = 0.5 * float(c[0] - c[-1])
+        ratios.append(state.observables["velocity"] / swimming_speed(values, pattern))
+        squares.append(pattern**2)
+    at_onset = (squares[1] * ratios[0] - squares[0] * ratios[1]) / (squares[1] - squares[0])
+    yield Row("speed over its law, as the pattern tends to zero", at_onset, 1.0, FORM, 1e-4)
+    for peclet in (24.0, 100.0):
+        state = found_state(steady(scenario("polar-swimmer", peclet=peclet)))
+        yield Row(
+            f"net friction force at Pe = {peclet:g}, of its parts", _net_friction(state), 0.0, "no external force", 1e-6
+        )
+
+
+def _net_friction(state: Steady) -> float:
+    """The axial friction force int Gamma v_u e_u.e_z dA over int Gamma |v_u e_u.e_z| dA."""
+    found = state.engine.problem.unpack(state.found.x)
+    rule = gauss_rule(QUADRATURE)
+    mesh = found.mesh
+    u = (mesh[:-1, None] + np.diff(mesh)[:, None] * rule.points).ravel()
+    weights = (np.diff(mesh)[:, None] * rule.weights).ravel()
+    fields = dict(zip(state.engine.system.fields, found.values(u).T, strict=True))
+    force = -fields["v"] * np.sin(fields["psi"]) * fields["r"]
+    return float(weights @ force / (weights @ np.abs(force)))
+
+
+def squeezed() -> Iterator[Row]:
+    """A passive sphere under excess pressure from outside yields to l where the tension is -l (l + 1) kappa/R^2."""
+    case = scenario("polar-swimmer", peclet=0.0)
+    found = branch(case, "tension", -21.0, start=-5.0, state="trivial", stability=False)
+    points = [point for point in found.special_points if point.kind in ("pitchfork", "transcritical")]
+    kinds = [point.kind for point in points]
+    if kinds != ["transcritical", "pitchfork", "transcritical"]:
+        raise Absent(f"found {', '.join(kinds) or 'no branch point'}; the branch ended so: {found.outcome}.")
+    for l, point in enumerate(points, start=2):
+        pressure_outside = -point.observables["pressure"]
+        yield Row(f"outer pressure at the {point.kind} of l = {l}", pressure_outside, 2.0 * l * (l + 1), OUYANG, 1e-8)
 
 
 def hopf() -> Iterator[Row]:

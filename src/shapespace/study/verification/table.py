@@ -6,7 +6,7 @@ from collections.abc import Callable
 from time import perf_counter
 
 from shapespace.study.records import own_versions
-from shapespace.study.verification import continuation, divisions, membranes, spheres
+from shapespace.study.verification import buckling, continuation, divisions, membranes, spheres
 from shapespace.study.verification.record import Benchmark, Result, Row, Verification
 from shapespace.study.verification.states import Absent
 
@@ -16,7 +16,9 @@ BENCHMARKS = (
     Benchmark("Active sphere with friction", spheres.active),
     Benchmark("Oscillating sphere", spheres.oscillating),
     Benchmark("The sphere polarizes", spheres.polarization),
+    Benchmark("The sphere swims", spheres.swimming),
     Benchmark("The sphere begins to oscillate", spheres.hopf, is_quick=False),
+    Benchmark("Sphere under outer pressure", spheres.squeezed),
     Benchmark("Clamped disc", membranes.buckling),
     Benchmark("Pulled disc", membranes.pull, is_quick=False),
     Benchmark("Tether", membranes.tether, is_quick=False),
@@ -27,8 +29,16 @@ BENCHMARKS = (
     Benchmark("Guided division, Fig. 6", divisions.neck),
     Benchmark("Guided division, Fig. 7b", divisions.folds),
     Benchmark("Balances of a run", divisions.balances),
-    Benchmark("Folds of classic problems", continuation.folds),
-    Benchmark("Branch points of a classic problem", continuation.branch_points),
+    Benchmark("Bratu's problem", continuation.bratu),
+    Benchmark("Gelfand's problem", continuation.gelfand),
+    Benchmark("Bratu's problem with free ends", continuation.neumann),
+    Benchmark("An integral condition", continuation.integral),
+    Benchmark("Chan's problem", continuation.chan),
+    Benchmark("Carrier's problem", continuation.carrier, is_quick=False),
+    Benchmark("Chafee and Infante's problem", continuation.chafee_infante),
+    Benchmark("Euler's elastica", buckling.elastica),
+    Benchmark("Elastic ring under pressure", buckling.ring, is_quick=False),
+    Benchmark("Soap film and liquid column", buckling.films),
 )
 
 Progress = Callable[[str, float], None]
