@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import shapespace as ss
 from shapespace.view.branch import _line, stretches, telling_observable
 
 
@@ -51,7 +52,7 @@ def test_lines():
 
 
 def test_along_an_observable_the_one_that_answers_is_drawn():
-    scenario = SimpleNamespace(kind="open-membrane")
+    scenario = ss.scenario("membrane-protrusion")
     point = SimpleNamespace(observables={"height": 0.7, "pulling_force": 3.0, "bending_energy": 20.0})
     for key, free, name in (
         ("height", "pulling_force", "pulling_force"),

@@ -86,7 +86,7 @@ class DiagramSource(AbstractSource):
                 "states": list(request.labels),
                 "names": names,
                 "strides": self._strides(),
-                "of": most_telling(scenario.kind, change),
+                "of": most_telling(scenario, change),
                 "outcomes": codes(outcomes),
                 "boundaries": [_boundary(curve) for curve in self._boundaries()],
                 "meanings": {str(code): [str(outcome), outcome.advice] for outcome, code in CODES.items()},

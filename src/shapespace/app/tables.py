@@ -48,5 +48,5 @@ def telling(at: Scenario, columns: dict[str, Array], known: Sequence[str]) -> st
         values = values[np.isfinite(values)]
         return float(np.ptp(values)) if values.size else 0.0
 
-    name = most_telling(at.kind, change, known)
+    name = most_telling(at, change, known)
     return name if name in columns else next(iter(name for name in columns if name not in known), known[0])

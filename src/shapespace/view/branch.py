@@ -54,7 +54,7 @@ def telling_observable(branch: Branch) -> str:
     if branch.free in branch.points[0].observables:
         return str(branch.free)
     return most_telling(
-        branch.scenario.kind,
+        branch.scenario,
         lambda name: float(np.ptp([point.observables[name] for point in branch.points])),
         (branch.key,),
     )

@@ -127,7 +127,7 @@ def draw_boundaries(axes: Axes, diagram: Diagram) -> None:
 
 def _telling(diagram: Diagram, states: xr.Dataset) -> str:
     """The first of TELLING that changes over the map."""
-    return most_telling(diagram.scenario.kind, lambda name: float(states[name].max() - states[name].min()))
+    return most_telling(diagram.scenario, lambda name: float(states[name].max() - states[name].min()))
 
 
 def _scale(name: str, values: np.ndarray, scale: float) -> tuple[Normalize, Colormap]:
