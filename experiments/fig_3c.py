@@ -145,7 +145,7 @@ def draw(branches: dict[str, ss.Branch], out: Path) -> None:
         left.set_ylim(-0.1, 6.0)
         handles = [handle(name, colour) for name, colour in colours.items()] + line_handles(drawn, style.INK)
         handles += [handle("fold", marker=MARKS["fold"], linestyle=""), handle("neck closes", marker="o", linestyle="")]
-        figure.legend(handles=handles, ncols=len(handles), loc="outside lower center")
+        figure.legend(handles=handles, ncols=4, loc="outside lower center")
         right.axvline(0.0, color=style.FAINT, linestyle=":", linewidth=0.8, zorder=0)
         right.set_xlim(-0.5, 1.4)
         right.set_ylim(0.25, 0.95)

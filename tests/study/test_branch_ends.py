@@ -160,3 +160,7 @@ def test_a_flat_disc_has_no_growth_rates():
     assert {point.spectrum for point in found.points} == {"no-rates"}
     assert {point.n_unstable for point in found.points} == {None}
     assert all(len(point.growth_rates) == 0 for point in found.points)
+    # A disc that is hardly pulled has them, the faster the flatter it is.
+    pulled = [ss.steady(case.with_overrides({"pulling_force": force})).rates() for force in (0.2, 0.4)]
+    assert [rates.n_unstable for rates in pulled] == [0, 0]
+    assert pulled[0].values[0][0] / pulled[1].values[0][0] == pytest.approx(4.0, rel=0.01)

@@ -48,7 +48,7 @@ def test_a_gap_is_left_where_the_observable_is_missing():
 
 
 def test_lines():
-    assert [_line(step(n)) for n in (0, 2, None)] == ["-", "--", ":"]
+    assert [_line(n) for n in (0, 2, None)] == ["-", "--", ":"]
 
 
 def test_along_an_observable_the_one_that_answers_is_drawn():

@@ -35,7 +35,7 @@ NOTABLE = 0.1
 INFINITE = 1e-8
 """Eigenvalues of S smaller than this part of the largest are zero but for round-off: their rates are infinite."""
 NOTHING = 1e-9
-"""A start that the finite part of S shrinks to a smaller part of itself, in units of 1/shift, meets round-off alone."""
+"""A vector that S shrinks to a smaller part of itself, in units of 1/shift, has no finite mode: what is left is round-off."""
 UNSEEN = 1e-4
 """Mean square weight of entries that the problem's inner product leaves out: slopes and fields known at points only."""
 
@@ -114,10 +114,10 @@ class Krylov:
         self._images = np.empty((capacity, n))
         self._matrix = np.zeros((capacity + 1, capacity))
         # Random, so that no mode is left out: from a start of one parity the others would never appear.
-        random = np.random.default_rng(seed).standard_normal(n)
-        reduced = self._roots * pencil.apply(pencil.apply(random))[self._moving]
-        size = np.linalg.norm(reduced)
-        self.is_invariant = not abs(pencil.shift) * size > NOTHING * pencil.size(random)
+        once = pencil.apply(np.random.default_rng(seed).standard_normal(n))
+        reduced = self._roots * pencil.apply(once)[self._moving]
+        size, before = np.linalg.norm(reduced), np.linalg.norm(self._roots * once[self._moving])
+        self.is_invariant = not abs(pencil.shift) * size > NOTHING * before
         if not self.is_invariant:
             self._basis[0] = reduced / size
 

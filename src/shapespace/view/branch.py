@@ -72,7 +72,7 @@ def stretches(points: Sequence[BranchPoint], name: str) -> list[list[BranchPoint
             continue
         last = found[-1][-1]
         found[-1].append(point)
-        if point.is_step and last.is_step and _line(point) != _line(last):
+        if point.is_step and last.is_step and _line(point.n_unstable) != _line(last.n_unstable):
             found[-1].pop()
             found.append([last, point])
         if point.label and point.n_unstable_before != point.n_unstable_after:
@@ -91,15 +91,16 @@ def draw_lines(
 
 def _draw_stretch(axes: Axes, stretch: Sequence[BranchPoint], name: str, across: str | None, colour: str | None) -> str:
     inner = [point for point in stretch[1:] if point.is_step] or [point for point in stretch if point.is_step]
-    line = _line(inner[0]) if inner else ":"
+    # Between two special points within one step the first one knows.
+    line = _line(inner[0].n_unstable if inner else stretch[0].n_unstable_after)
     x = [point.observables[across] if across else point.parameter for point in stretch]
     y = [point.observables[name] for point in stretch]
     axes.plot(x, y, line, color=colour or (style.BLUE if line == "-" else style.INK))
     return line
 
 
-def _line(point: BranchPoint) -> str:
-    return ":" if point.n_unstable is None else "-" if point.n_unstable == 0 else "--"
+def _line(growing: int | None) -> str:
+    return ":" if growing is None else "-" if growing == 0 else "--"
 
 
 def _draw_specials(axes: Axes, points: Sequence[BranchPoint], name: str) -> None:
