@@ -34,8 +34,9 @@ from benchmarks.peer_solve_bvp import Parameters
 from benchmarks.peer_steady_bvp import along
 
 from shapespace.base.outcome import Outcome
+from shapespace.study.diagram_anchors import lay_anchors
 from shapespace.study.diagram_store import DiagramStore, open_diagram
-from shapespace.study.diagrams import diagram, lay_anchors, make_request
+from shapespace.study.diagrams import diagram, make_request
 from shapespace.study.grid import Axis, Grid
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.steady import Steady, steady, steady_from

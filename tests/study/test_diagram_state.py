@@ -78,10 +78,10 @@ def test_damaged_numbers_are_said_in_a_line(stored: Diagram, tmp_path: Path):
     part.write_bytes(part.read_bytes()[:20])
     numbers = DiagramNumbers(DiagramStore.open(copy))
     assert numbers.whole("area").shape == (1, 2, 76)
-    with pytest.raises(StoreError, match=r"copy: numbers in it are damaged.*--out"):
+    with pytest.raises(StoreError, match=r"length/c/0/0: numbers of tile 0, 0 are damaged.*--resume"):
         numbers.whole("length")
     # The first part is that of the first tile.
-    with pytest.raises(StoreError, match=r"copy: numbers in it are damaged.*--out"):
+    with pytest.raises(StoreError, match=r"length/c/0/0: numbers of tile 0, 0 are damaged.*--resume"):
         numbers.at(0, 0, 0)
 
 

@@ -7,8 +7,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from shapespace.base.errors import InputError, WorkerError
-from shapespace.study.records import own_versions
-from shapespace.study.tiles import Done, Tile, compute_tile
+from shapespace.study.grid import Tile
+from shapespace.study.tiles import Done, compute_tile
+from shapespace.study.versions import own_versions
 
 SECONDS = 10.0
 """To wait for a scheduler's answer."""

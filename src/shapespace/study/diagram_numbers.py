@@ -1,18 +1,16 @@
 """The numbers of a stored diagram, read part by part: of a map of many points all of them take long."""
 
 import asyncio
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 import zarr
 
-from shapespace.base.errors import StoreError
 from shapespace.base.scales import QUANTITIES
+from shapespace.study.diagram_arrays import open_arrays, reading
 from shapespace.study.diagram_store import DiagramStore
-from shapespace.study.files import storage
 from shapespace.study.frame import Array
 
 TOGETHER = {"codec_pipeline.batch_size": 64}
@@ -27,12 +25,9 @@ class DiagramNumbers:
 
     def __init__(self, store: DiagramStore) -> None:
         self._path, self._is_finished = store.path, store.outcome is not None
-        with storage(store.path), zarr.config.set(TOGETHER):
-            try:
-                group: Any = zarr.open_group(store.path, mode="r")
-                found = {name: array for name, array in group.arrays() if array.ndim >= 2}
-            except (ValueError, KeyError, FileNotFoundError) as error:
-                raise StoreError(f"{store.path / 'zarr.json'}: is damaged or missing ({error}).") from None
+        self._tiles = store.request.grid.tiles
+        with zarr.config.set(TOGETHER):
+            found = {name: array for name, array in open_arrays(store.path).items() if array.ndim >= 2}
         known = {name: place for place, name in enumerate(QUANTITIES)}
         self.names = sorted(found, key=lambda name: (known.get(name, len(known)), name))
         self._arrays = {name: found[name] for name in self.names}
@@ -42,7 +37,7 @@ class DiagramNumbers:
         """An array (states, n_y, n_x)."""
         if name in self._read:
             return self._read[name]
-        with self._reading():
+        with reading(self._path, self._tiles):
             values = np.asarray(self._arrays[name][...])
         values = values.reshape(-1, *values.shape[-2:])
         if self._is_finished:
@@ -63,17 +58,6 @@ class DiagramNumbers:
 
         if missing:
             # In a thread of its own, since a notebook has a loop of events in this one.
-            with self._reading(), ThreadPoolExecutor(1) as pool:
+            with reading(self._path, self._tiles), ThreadPoolExecutor(1) as pool:
                 known |= zip(missing, map(float, pool.submit(asyncio.run, read()).result()), strict=True)
         return {name: known[name] for name in names}
-
-    @contextmanager
-    def _reading(self) -> Iterator[None]:
-        """Say in a line what is wrong with the parts of arrays."""
-        with storage(self._path):
-            try:
-                yield
-            except (RuntimeError, ValueError) as error:
-                raise StoreError(
-                    f"{self._path}: numbers in it are damaged ({error}); restore it, or compute it again with another --out."
-                ) from None

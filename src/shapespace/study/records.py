@@ -10,13 +10,12 @@ leaves whole files and at most a `*.tmp` that the next writer removes. Each arra
 
 import json
 import os
-import platform
 import re
+import shutil
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from types import TracebackType
 from typing import Any, ClassVar, Generic, Self, TypeVar
@@ -27,6 +26,7 @@ from shapespace.base.scales import QUANTITIES
 from shapespace.study.files import acquire_lock, storage, sync_directory, write_atomically
 from shapespace.study.frame import DAMAGE
 from shapespace.study.scenario import Scenario
+from shapespace.study.versions import own_versions
 
 FORMAT_VERSION = 2
 """To be raised with every change of what is stored, of records too: others are not read."""
@@ -63,7 +63,7 @@ class AbstractRecordStore(ABC, Generic[R]):
         self._manifest = manifest
         self._count = count
         self._lock = lock
-        self._unwritten: dict[str, Any] | None = None  # the manifest of a resumed store, due with its next record
+        self._unwritten: dict[str, Any] | None = None  # the manifest of a resumed store, due before it is written to
 
     @staticmethod
     @abstractmethod
@@ -80,25 +80,37 @@ class AbstractRecordStore(ABC, Generic[R]):
         """What shows that a record does not follow the one before it."""
 
     @classmethod
-    def _create(cls, path: str | Path, scenario: Scenario, more: Mapping[str, Any]) -> Self:
-        """A new store in a directory that is empty or does not exist; StoreError, and nothing written, otherwise."""
+    def _create(
+        cls,
+        path: str | Path,
+        scenario: Scenario,
+        more: Mapping[str, Any],
+        furnish: Callable[[Self], None] = lambda store: None,
+    ) -> Self:
+        """A new store in a directory that is empty or does not exist; StoreError, and nothing written, otherwise.
+
+        furnish: writes what else belongs there from the beginning; killed in it, the store is there to be resumed.
+        """
         path = Path(path)
         with storage(path):
             cls.check_free(path)
             made = [directory for directory in (path, *path.parents) if not directory.exists()]
-        lock = None
+        lock, is_own = None, False
         try:
             with storage(path):
                 path.mkdir(parents=True, exist_ok=True)
                 lock = acquire_lock(path / _LOCK)
                 cls.check_free(path)
+                is_own = True
                 (path / cls.folder).mkdir(exist_ok=True)
                 manifest = cls._new_manifest(scenario) | dict(more)
                 _write_json(path / _MANIFEST, manifest)
+                store = cls(path, manifest, 0, lock)
+                furnish(store)
         except BaseException:
-            cls._undo(path, made, lock)
+            cls._undo(path, made, lock, is_own)
             raise
-        return cls(path, manifest, 0, lock)
+        return store
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
@@ -117,7 +129,7 @@ class AbstractRecordStore(ABC, Generic[R]):
 
     @classmethod
     def _reopen(cls, path: Path, scenario: Scenario) -> Self:
-        """A store to continue, with every record checked; `scenario` is written with the next record."""
+        """A store to continue, with every record checked; `enter` writes `scenario` and the session."""
         with storage(path):
             lock = acquire_lock(path / _LOCK)
         try:
@@ -141,13 +153,18 @@ class AbstractRecordStore(ABC, Generic[R]):
 
     def append(self, record: R) -> None:
         """Write the next record. After a StoreError (disk full, not writable) all records before it are intact."""
-        self._check_writable()
+        self.enter()
         with storage(self.path, self._remedy):
-            if self._unwritten is not None:
-                _write_json(self.path / _MANIFEST, self._unwritten)
-                self._manifest, self._unwritten = self._unwritten, None
             write_atomically(self._file(self._count), self.encode(record))
         self._count += 1
+
+    def enter(self) -> None:
+        """Note that a session writes to this store, before it does so."""
+        self._check_writable()
+        if self._unwritten is not None:
+            with storage(self.path, self._remedy):
+                _write_json(self.path / _MANIFEST, self._unwritten)
+            self._manifest, self._unwritten = self._unwritten, None
 
     def finish(self, outcome: Outcome) -> None:
         """Note how the computation ended."""
@@ -265,15 +282,16 @@ class AbstractRecordStore(ABC, Generic[R]):
             raise StoreError(f"{path}: holds other files ({min(names)}); choose an empty or a new directory as --out.")
 
     @classmethod
-    def _undo(cls, path: Path, made: list[Path], lock: int | None) -> None:
-        """Take back what a failed creation wrote. Without the lock another process owns the directory: leave it alone."""
+    def _undo(cls, path: Path, made: list[Path], lock: int | None, is_own: bool) -> None:
+        """Take back what a failed creation wrote, in a directory that was found free under the lock."""
         with suppress(OSError):
-            if lock is not None:
-                (path / cls.folder).rmdir()
-        with suppress(OSError):
-            if lock is not None:
-                (path / _LOCK).unlink()
-                os.close(lock)
+            # The manifest last but one: killed before, the store is there to be resumed.
+            last = (_MANIFEST, _LOCK)
+            entries = sorted(path.iterdir(), key=lambda one: last.index(one.name) if one.name in last else -1)
+            for entry in entries if is_own else ():
+                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+        if lock is not None:
+            os.close(lock)
         with suppress(OSError):
             for directory in made:
                 directory.rmdir()
@@ -377,14 +395,3 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
 
 def _now() -> str:
     return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def own_versions() -> dict[str, str]:
-    """Of Python and of the packages that results depend on."""
-    versions = {"python": platform.python_version()}
-    for package in ("shapespace", "jax", "numpy"):
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            versions[package] = "not installed"
-    return versions

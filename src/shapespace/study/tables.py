@@ -19,7 +19,7 @@ from shapespace.study.frame import Frame
 from shapespace.study.records import CONVENTIONS, noun_of
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import open_search
-from shapespace.study.starts import find_start
+from shapespace.study.stored_starts import stored_start
 
 STATE, POINT = "state", "point"
 RATES = 6
@@ -43,7 +43,7 @@ def stored_dataset(text: str | Path) -> xr.Dataset:
         frames = [one.frame for one in search.states if one.frame]
         return _states([search.scenario] * len(frames), frames, {})
     if noun is None and ":" in str(text) and not path.is_dir():
-        start = find_start(text)
+        start = stored_start(text)
         return _states([start.scenario], [start.frame], {})
     return open_dataset(path)
 

@@ -18,7 +18,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from shapespace.base.errors import StoreError, WorkerError
-from shapespace.study.tiles import Done, Tile, compute_tile
+from shapespace.study.grid import Tile
+from shapespace.study.tiles import Done, compute_tile
 
 MAX_DEATHS = 3
 """Workers that one tile may cost."""
