@@ -24,7 +24,7 @@ from shapespace.study.steady import check_has_isolated_states
 from shapespace.study.tiles import Done, observable_names
 from shapespace.study.workers import Workers, available_cores
 
-MAX_BRANCHES = 16
+MAX_BRANCHES, MAX_SEARCHES = 16, 64
 
 Progress = Callable[[Done], None]
 """Called after each tile."""
@@ -49,6 +49,7 @@ def diagram(
     progress: Progress | None = None,
     curve_progress: CurveProgress | None = None,
     ready: Callable[[int, int], None] | None = None,
+    waiting: Callable[[int], None] | None = None,
 ) -> Diagram:
     """Stationary states of a scenario over a grid of two keys, x and y as `key=from:to:count`, in a Zarr store.
 
@@ -60,12 +61,13 @@ def diagram(
     adaptive: compute only where the kind of the states changes, and give other points the kind of those around, with outcome
     `inferred` and without values. workers: processes, by default one for each core; dask: address of a scheduler whose
     workers compute instead; the map does not depend on them. `out` is the directory of the store, new or empty; with `resume`
-    a store there is continued. ready: told how many points are done of how many. InputError before anything is computed;
-    where a process cannot be kept alive, WorkerError.
+    a store there is continued. ready: told how many points are done of how many; waiting: of a cluster how many workers it has,
+    at first and while no tile is finished. InputError before anything is computed; where a process cannot be kept alive,
+    WorkerError.
     """
     grid = Grid(*(Axis.read(one, flag) if isinstance(one, str) else one for flag, one in (("-x", x), ("-y", y))))
     request = make_request(scenario, grid, states, stability, branches, origins, adaptive, deflate)
-    engine = _engine(workers, dask)
+    engine = _engine(workers, dask, Path(out))
     begin = DiagramStore.resume if resume and holds_store(out) else DiagramStore.create
     with engine, begin(out, scenario, request, observable_names(scenario, grid.keys)) as store:
         missing = store.missing_tiles
@@ -75,7 +77,7 @@ def diagram(
         if missing or store.outcome is None:
             store.enter()
         lay_anchors(store)
-        for done in engine.map(store.path, missing):
+        for done in engine.map(store.path, missing, waiting or (lambda count: None)):
             if progress is not None:
                 progress(done)
         if missing or store.outcome is None:
@@ -107,12 +109,11 @@ def make_request(
             raise InputError(f"{option}: adds states to those of --branches N; give that too.")
     if adaptive and branches:
         raise InputError(f"--adaptive and --branches {branches}: adaptive maps follow named states; give only one.")
-    corners = grid.corners(scenario)
-    if not 0 <= deflate <= len(grid.nodes):
-        raise InputError(f"--deflate {deflate}: must be 1 to {len(grid.nodes)} on this grid, or 0 for no searches.")
+    if not 0 <= deflate <= MAX_SEARCHES:
+        raise InputError(f"--deflate {deflate}: must be 1 to {MAX_SEARCHES}, or 0 for no searches.")
     for origin in origins:
         find_starts(origin, scenario)
-    for corner in corners:
+    for corner in grid.corners(scenario):
         check_has_isolated_states(corner)
     KeyedProblem.of(scenario, grid.keys)
     return DiagramRequest(grid, names, stability, branches, tuple(map(str, origins)), adaptive, deflate)
@@ -122,12 +123,12 @@ def _size(grid: Grid, tile: Index) -> int:
     return int(np.prod([one.stop - one.start for one in grid.span(tile)]))
 
 
-def _engine(workers: int | None, dask: str | None) -> Workers | Cluster:
+def _engine(workers: int | None, dask: str | None, out: Path) -> Workers | Cluster:
     """What computes tiles."""
     if dask is not None:
         if workers is not None:
             raise InputError(f"--workers {workers} and --dask {dask}: the cluster has its own workers; give only one.")
-        return Cluster(dask)
+        return Cluster(dask, out)
     count = available_cores() if workers is None else workers
     if count < 1:
         raise InputError(f"--workers {count}: must be at least 1; give a larger number.")

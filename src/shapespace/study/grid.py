@@ -126,15 +126,9 @@ class Grid:
         return list(dict.fromkeys((*self.middles, *lattice)))
 
     def spread(self, count: int) -> list[tuple[int, int]]:
-        """So many nodes as far from each other as can be, from that in the middle of the map on."""
-        places = np.array(self.nodes)
-        shares = places / np.maximum(np.array(self.shape) - 1, 1)
-        apart = np.linalg.norm(shares - 0.5, axis=1)
-        found = [int(apart.argmin())]
-        while len(found) < min(count, len(places)):
-            nearest = np.min([np.linalg.norm(shares - shares[one], axis=1) for one in found], axis=0)
-            found.append(int(nearest.argmax()))
-        return [self.nodes[one] for one in found[:count]]
+        """So many points spread over the map, the first of them for any larger count as well: Halton's sequence."""
+        shares = ((_halton(number, 2), _halton(number, 3)) for number in range(1, count + 1))
+        return [(int(a * self.x.count), int(b * self.y.count)) for a, b in shares]
 
     def values(self, i: Any, j: Any) -> Array:
         """Values of both keys, (n_i, n_j, 2), for indices or slices along x and y."""
@@ -191,3 +185,12 @@ def _check_parameter(scenario: Scenario, axis: Axis, flag: str) -> None:
     raise InputError(
         f"-{flag} {axis}: {axis.key} {what}, while maps vary parameters of the model; choose one of {', '.join(parameters)}."
     )
+
+
+def _halton(number: int, base: int) -> float:
+    """The digits of a number in a base mirrored at the point: 1/2, 1/4, 3/4, ... in base 2."""
+    found, unit = 0.0, 1.0 / base
+    while number:
+        number, digit = divmod(number, base)
+        found, unit = found + unit * digit, unit / base
+    return found
