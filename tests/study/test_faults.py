@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from tests.study.test_diagram_cluster import OWN
 
 from shapespace.analysis import sweeping
 from shapespace.analysis.stationary import Stationary
@@ -27,6 +28,7 @@ from shapespace.base.problem import AbstractProblem
 from shapespace.numerics.newton import Root
 from shapespace.study.diagram_store import Diagram, DiagramStore, open_diagram
 from shapespace.study.diagrams import diagram
+from shapespace.study.plugins import import_file
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.tiles import Done
 from shapespace.study.workers import MAX_DEATHS, Workers
@@ -343,3 +345,18 @@ def test_another_version_on_a_worker(tmp_path: Path, daemons: Daemons):
     with pytest.raises(InputError, match=r"has shapespace 0\.0\.9, not .*; install the same version there"):
         diagram(swimmer(), X, Y, out=tmp_path / "d", dask=daemons.address)
     assert not (tmp_path / "d").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("own_models")
+def test_a_worker_learns_models_of_ones_own(tmp_path: Path, daemons: Daemons):
+    """It is started where nobody knows of them."""
+    daemons.start_worker()
+    workers_of(daemons.address, 1)
+    file = tmp_path / "own.py"
+    file.write_text(OWN)
+    import_file(file)
+    case = scenario("dragged-swimmer", **SETTINGS)
+    axes = ("peclet=150:160:2", "inverse_hydrodynamic_length=1:2:2")
+    found = diagram(case, *axes, out=tmp_path / "d", dask=daemons.address)
+    assert found.converged == 4
