@@ -162,7 +162,7 @@ def test_a_map_without_states_is_no_success(shell: Shell):
         ([*AXES, "--out", "foreign"], "holds other files"),
         ([*AXES, "--workers", "0"], "workers"),
         ([*AXES, "--workers", "1.5"], "1.5 must be a whole number"),
-        ([*AXES, "--branches", "2", "--from", "nowhere"], "--from nowhere: is no directory of stored states"),
+        ([*AXES, "--branches", "2", "--from", "nowhere"], "--from nowhere: is not a directory with stored states"),
     ],
 )
 def test_bad_diagram_is_one_line(shell: Shell, arguments: list[str], part: str):

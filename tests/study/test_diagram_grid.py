@@ -9,6 +9,7 @@ from shapespace.study.grid import STORED_WHOLE, Axis, Grid
 def test_tiles_cover_the_grid_once():
     for counts in ((2, 500), (9, 10), (11, 26), (101, 77)):
         grid = Grid(*(Axis(key, 0.0, 1.0, count) for key, count in zip(("a", "b"), counts, strict=True)))
+        assert [grid.number(tile) for tile in grid.tiles] == [*range(len(grid.tiles))]
         met = np.zeros(grid.shape, int)
         for tile in grid.tiles:
             span = grid.span(tile)

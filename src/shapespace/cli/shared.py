@@ -69,7 +69,8 @@ StartFrom = Annotated[
     Parameter(
         name="--from",
         metavar="STORE[:LABEL]",
-        help="Start from the last state of a stored run, or a labelled one of a branch, a curve or a search.",
+        help="Start from the last state of a stored run, a labelled one of a branch, a curve or a search, or that at a point "
+        "STATE,I,J of a diagram.",
     ),
 ]
 

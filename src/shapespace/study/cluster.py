@@ -99,7 +99,9 @@ class Cluster:
                 try:
                     future = finished.get(timeout=PAUSE)
                 except Empty:
-                    waiting(len(self._client.nthreads()))
+                    # Without a scheduler all futures are given up soon.
+                    if self._client.status == "running":
+                        waiting(len(self._client.nthreads()))
                     continue
                 count -= 1
                 yield future.result()

@@ -6,15 +6,11 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-import zarr
 
 from shapespace.base.scales import QUANTITIES
 from shapespace.study.diagram_arrays import open_arrays, reading
 from shapespace.study.diagram_store import DiagramStore
 from shapespace.study.frame import Array
-
-TOGETHER = {"codec_pipeline.batch_size": 64}
-"""Chunks that are decoded in one go: half the time of one by one."""
 
 
 class DiagramNumbers:
@@ -26,8 +22,7 @@ class DiagramNumbers:
     def __init__(self, store: DiagramStore) -> None:
         self._path, self._is_finished = store.path, store.outcome is not None
         self._tiles = store.request.grid.tiles
-        with zarr.config.set(TOGETHER):
-            found = {name: array for name, array in open_arrays(store.path).items() if array.ndim >= 2}
+        found = {name: array for name, array in open_arrays(store.path).items() if array.ndim >= 2}
         known = {name: place for place, name in enumerate(QUANTITIES)}
         self.names = sorted(found, key=lambda name: (known.get(name, len(known)), name))
         self._arrays = {name: found[name] for name in self.names}

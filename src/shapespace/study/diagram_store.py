@@ -253,7 +253,7 @@ class DiagramStore(AbstractRecordStore[Anchors]):
             raise StoreError(f"{file}: is damaged ({error}); resume the diagram to compute it again.") from None
 
     def _shapes_file(self, tile: Tile) -> Path:
-        return self.path / SHAPES / f"{self.request.grid.tiles.index(tile):06d}.npz"
+        return self.path / SHAPES / f"{self.request.grid.number(tile):06d}.npz"
 
     @property
     def outcomes(self) -> NDArray[np.int8]:

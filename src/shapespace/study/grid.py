@@ -130,6 +130,10 @@ class Grid:
         shares = ((_halton(number, 2), _halton(number, 3)) for number in range(1, count + 1))
         return [(int(a * self.x.count), int(b * self.y.count)) for a, b in shares]
 
+    def number(self, tile: Tile) -> int:
+        """The place of a tile among all."""
+        return tile[1] * self.x.tiles + tile[0]
+
     def values(self, i: Any, j: Any) -> Array:
         """Values of both keys, (n_i, n_j, 2), for indices or slices along x and y."""
         return np.stack(np.meshgrid(self.x.values[i], self.y.values[j], indexing="ij"), axis=-1)
@@ -153,7 +157,7 @@ class Grid:
         columns = min(x.stop - x.start, most // max(lines, 1))
         lines = min(y.stop - y.start, most // max(columns, 1))
         if min(lines, columns) < 2:
-            return [self.middles[self.tiles.index(tile)]]
+            return [self.middles[self.number(tile)]]
         i, j = (
             np.linspace(one.start, one.stop - 1, count).round().astype(int).tolist()
             for one, count in ((x, columns), (y, lines))

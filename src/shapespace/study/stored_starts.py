@@ -71,7 +71,7 @@ def stored_start(text: str | Path) -> Start:
     path, label = parts_of(text)
     if not path.is_dir():
         raise StoreError(
-            f"--from {text}: is no directory of stored states; give one that a command made, or STORE:LABEL."
+            f"--from {text}: is not a directory with stored states; give one that a command made, or STORE:LABEL."
         )
     noun = noun_of(path)
     if noun == "diagram":

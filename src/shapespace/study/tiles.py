@@ -103,7 +103,7 @@ def shape_of(state: Stationary, sheet: int, number: int, place: Index) -> Shape:
 
 def _untried(store: DiagramStore, anchors: Anchors, tile: Tile) -> Outcome:
     """Why there is no state where none was tried."""
-    own = anchors.outcomes[store.request.grid.tiles.index(tile)]
+    own = anchors.outcomes[store.request.grid.number(tile)]
     return own if own is not Outcome.CONVERGED else Outcome.NOT_REACHED
 
 
@@ -205,7 +205,7 @@ def _sheets(store: DiagramStore, surveyor: "Surveyor", tile: Tile) -> list[Sweep
     request = store.request
     grid = request.grid
     x, y = grid.span(tile)
-    middle = grid.middles[grid.tiles.index(tile)]
+    middle = grid.middles[grid.number(tile)]
 
     def starts() -> Iterator[tuple[Index, Stationary]]:
         near = [
