@@ -49,7 +49,11 @@ class Cluster:
         names = [name for name in logging.root.manager.loggerDict if name.startswith("distributed")]
         self._levels = {name: logging.getLogger(name).level for name in names}
         self._set_levels(dict.fromkeys(self._levels, logging.CRITICAL))
-        self._client = Client(address, timeout=SECONDS, set_as_default=False)
+        try:
+            self._client = Client(address, timeout=SECONDS, set_as_default=False)
+        except (OSError, ValueError) as error:
+            self._set_levels(self._levels)
+            raise InputError(f"--dask {address}: its scheduler takes no client ({error}); start another one.") from None
         try:
             self._check_workers(out)
         except BaseException:
