@@ -1,21 +1,23 @@
 """Maps of swimmers (Fig. 5: Peclet number and hydrodynamic length): what a point costs, beside single solves and solve_bvp.
 
 Run from the root: python -m benchmarks.bench_diagram [PART ...]
-    points      COUNT x COUNT points tile by tile, a loop over single solves, and solve_bvp with natural continuation on a row of
-                the same map; processor time on one core, everything compiled (a minute)
+    points      COUNT x COUNT points tile by tile, a loop over single solves on a diagonal of them, and solve_bvp with natural
+                continuation along a row of them; processor time on one core, everything compiled (a minute)
     growth      cost per point on grids of 50 x 50 to 500 x 500, sampled by tiles (two minutes)
     workers     the same map by one and by two processes, wall-clock; wants an idle machine (a minute)
+    batch       residual and Jacobian of B states at once, by jax.vmap and jax.lax.map, against a loop over single ones, on one
+                core (two minutes, of which most is compiling)
     scheduler   many short tasks through a Dask scheduler, and what a tile costs besides its points (half a minute)
     full        the map of Fig. 5, 500 x 500, as `shapespace diagram` computes it: time, memory, points without a state (a quarter
                 of an hour on two idle cores)
-Without PART: points, growth, workers and scheduler. --count N: another COUNT than 40, for full than 500; --workers N: for full.
+Without PART: all but full. --count N: another COUNT than 40, for full than 500; --workers N: for full.
 """
 
 import sys
 
 from benchmarks.timing import machine, use_one_core
 
-PARTS = ("points", "growth", "workers", "scheduler", "full")
+PARTS = ("points", "growth", "workers", "batch", "scheduler", "full")
 if not {*sys.argv[1:]} & {"workers", "scheduler", "full"} and len(sys.argv) > 1:
     use_one_core()
 
@@ -25,17 +27,21 @@ import resource
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
+import jax
 import numpy as np
 from benchmarks.peer_solve_bvp import Parameters
 from benchmarks.peer_steady_bvp import along
+from benchmarks.timing import milliseconds
 
 from shapespace.base.outcome import Outcome
+from shapespace.study.diagram_anchors import lay_anchors
 from shapespace.study.diagram_store import DiagramStore, open_diagram
-from shapespace.study.diagrams import diagram, lay_anchors, make_request
+from shapespace.study.diagrams import diagram, make_request
 from shapespace.study.grid import Axis, Grid
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.settling import settle
@@ -48,6 +54,7 @@ SAMPLE = 20
 TILES = 4
 """That stand for a large map."""
 TASKS = 2000
+BATCHES = (1, 8, 32)
 
 
 def axes(count: int) -> tuple[Axis, Axis]:
@@ -95,21 +102,27 @@ def points(count: int) -> None:
             print(f"    {name}: " + ", ".join(f"{n} x {v:g}" for v, n in zip(values, counts, strict=True)))
     middle = steady(case)
     state = middle.problem.base.unpack(middle.found.x)
-    x, y = (np.linspace(*ends, SAMPLE) for ends in (PECLET, LENGTH))
+    grid = Grid(*axes(count))
+    diagonal = np.linspace(0, count - 1, SAMPLE).round().astype(int)
     start, converged = time.process_time(), 0
-    for peclet, length in zip(x, y, strict=True):
-        at = case.with_overrides({"peclet": peclet, "inverse_hydrodynamic_length": length})
-        found = steady_of(at, settle(at, state))
+    for i in diagonal.tolist():
+        there = at(case, grid, i, i)
+        found = steady_of(there, settle(there, state))
         converged += found.outcome is Outcome.CONVERGED and bool(found.observables)
-    milliseconds = 1e3 * (time.process_time() - start) / SAMPLE
-    print(f"loop over single solves from one state: {milliseconds:.1f} ms a point, {converged} of {SAMPLE} converged")
-    peer(case, count)
+    each = 1e3 * (time.process_time() - start) / SAMPLE
+    print(f"loop over single solves from one state: {each:.1f} ms a point, {converged} of {SAMPLE} converged")
+    peer(case, grid)
 
 
-def peer(case: Scenario, count: int) -> None:
-    """The points next to (100, 1) along the Peclet number, spaced as in the map."""
-    step = (PECLET[1] - PECLET[0]) / (count - 1)
-    cases = [case.with_overrides({"peclet": 100.0 + i * step}) for i in range(SAMPLE)]
+def at(case: Scenario, grid: Grid, i: int, j: int) -> Scenario:
+    """The scenario at a point of the grid."""
+    return case.with_overrides(dict(zip(grid.keys, grid.values(i, j).ravel().tolist(), strict=True)))
+
+
+def peer(case: Scenario, grid: Grid) -> None:
+    """Points of the map side by side along the Peclet number, from next to (100, 1) on."""
+    i, j = (int(np.abs(axis.values - value).argmin()) for axis, value in ((grid.x, 100.0), (grid.y, 1.0)))
+    cases = [at(case, grid, i + k, j) for k in range(SAMPLE)]
     first = steady(cases[0])
     for tol in (1e-3, 1e-6):
         found = list(along([parameters(one) for one in cases], *guess(first), tol))
@@ -170,6 +183,33 @@ def workers(count: int) -> None:
                 times[number] = (time.perf_counter() - start) / sum(one.points for one in done)
         print(f"    {number} at work: {1e3 * times[number]:.2f} ms a point, wall-clock")
     print(f"two processes: {times[1] / times[2]:.2f} times one, on {os.cpu_count()} cores")
+
+
+def fastest(function: Callable[[np.ndarray], Any], tiles: np.ndarray) -> float:
+    """Milliseconds of one call, its results waited for."""
+    return milliseconds(lambda: jax.block_until_ready(function(tiles)), 50)[0]
+
+
+def batch() -> None:
+    """The kernel that takes most of a point's time, for many points in one call."""
+    found = steady(scenario("polar-swimmer"))
+    problem, x, p = found.problem.base, found.found.x, found.engine.p
+    (tile,) = problem._tiles(x, p)
+    single = problem.functions.linearised
+    function = single._function
+    expected = [np.asarray(one) for one in jax.tree.leaves(single(tile))]
+    together = {"vmap": jax.vmap(function), "lax.map": lambda tiles: jax.lax.map(function, tiles)}
+    for size in BATCHES:
+        tiles = np.repeat(tile[None], size, axis=0)
+        words = [f"loop {fastest(lambda batch: [single(one) for one in batch], tiles) / size:.3f}"]
+        for name, mapped in together.items():
+            start = time.perf_counter()
+            compiled = jax.jit(mapped).lower(tiles).compile()
+            seconds = time.perf_counter() - start
+            for one, wanted in zip(jax.tree.leaves(compiled(tiles)), expected, strict=True):
+                np.testing.assert_allclose(one[-1], wanted, rtol=1e-9, atol=1e-9)
+            words.append(f"{name} {fastest(compiled, tiles) / size:.3f} (compiling {seconds:.0f} s)")
+        print(f"    {size} points at once, ms a point: {', '.join(words)}", flush=True)
 
 
 def scheduler(count: int) -> None:
@@ -246,6 +286,7 @@ def main() -> None:
         "points": lambda: points(count),
         "growth": growth,
         "workers": lambda: workers(count),
+        "batch": batch,
         "scheduler": lambda: scheduler(count),
         "full": lambda: full(options.count or 500, options.workers),
     }

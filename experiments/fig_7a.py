@@ -2,22 +2,30 @@
 
 What. A weak ring or weak contractility leaves an ellipsoid, both strong a dumbbell, and between these lies a wedge where
 either is found (Sec. V B 2 of the paper). We compute all stationary states that folds connect at each point of a grid in
-(Delta_c, Pe). The wedge is bounded by the folds of the ellipsoid and of the dumbbell, which we locate on one branch and
-follow in both parameters, the dumbbell's to the cusp where it ends, and by the pitchfork at which the dumbbell yields to
-a slipping ring. The dynamics is run from a sphere and from a slightly slipped dumbbell: crosses are points where both
-come to the same surface, circles those where they do not.
+(Delta_c, Pe), and follow in both parameters what bounds the wedge, far beyond the paper's range: the folds of the ellipsoid
+and of the dumbbell, and the pitchforks at which the ellipsoid polarizes and the dumbbell yields to a slipping ring. The
+dynamics is run from a sphere and from a slightly slipped dumbbell: crosses are points where both come to the same
+surface, circles those where they do not.
 
 Parameters: Table 5, k = 45, R0/L_h = 0.3, c_s = 10, w^2 = 0.02. The paper considers Pe < 500; the ranges Delta_c = 0 to 8,
 Pe = 60 to 500 are ours. Units: R0, kappa, tau = eta_b R0^2/kappa, c0.
 
-Run:   python experiments/fig_7a.py [--quick] [--out DIR]        Time: 15 min on two cores, --quick 1 min on one.
+Run:   python experiments/fig_7a.py [--quick] [--out DIR]        Time: 10 min on two cores, --quick 30 s on one.
 
 Expect: at Pe = 450 folds at Delta_c = 2.36247419 and 1.29348538, which AUTO-07p finds as well; three states at every
-point between the two curves and one elsewhere; towards Pe = 67 the ellipsoid's fold goes to Delta_c = 41 and turns, so that
-the wedge does not close at weak contractility; towards strong contractility it narrows, and the dumbbell's fold ends in a
-cusp at Delta_c = 0.116, Pe = 1954.9, beyond the paper's range. Well before its fold the ellipsoid has a slight waist, so that
-in a part of the wedge both surfaces have a neck, a wide one and a narrow one. Between the dumbbell's fold and the
-pitchfork, which parts from it at Pe = 221.3, the dumbbell is unstable: there, too, the dynamics has one attractor.
+point between the two curves and one elsewhere. Well before its fold the ellipsoid has a slight waist, so that in a part of
+the wedge both surfaces have a neck, a wide one and a narrow one. The two folds never meet:
+
+Towards weak contractility both turn to ever stronger rings, the ellipsoid's at Pe = 66.98, Delta_c = 41.5, the dumbbell's
+at Pe = 32.72, Delta_c = 28.6: a ring that saturates the tension everywhere no longer pinches. Below Pe = 66.98 there is an
+ellipsoid at any amplitude, below Pe = 32.72 no dumbbell at any.
+
+Towards strong contractility both surfaces lose stability before they vanish. The ellipsoid does at a pitchfork that parts
+from its fold at Pe = 620.3 and comes to Delta_c = 0 where the sphere polarizes, Pe* = 2397.2. The dumbbell is stable from
+its own pitchfork on, which parts from its fold at Pe = 221.3, up to where its neck grows too thin: another stretch of that
+pitchfork, from Pe = 487.5 on, a third fold, from Pe = 668.5 on, or oscillations. Between Pe = 860 and 900 nothing is left
+in between, and with it of the wedge of two stable shapes. The dumbbell's fold itself goes on to a cusp at Delta_c = 0.116,
+Pe = 1954.9, where it meets that third fold; the ellipsoid's is then at Delta_c = 0.46.
 """
 
 from collections.abc import Sequence
@@ -40,12 +48,22 @@ from shapespace.view.diagram import draw_regimes
 RING, PECLET, NECK = "ring_amplitude", "peclet", "equator_radius"
 LEAST, MOST = 60.0, 500.0
 """Peclet numbers of the map,"""
-WEAKEST, STRONGEST, SLIPPING = 50.0, 2000.0, 220.0
-"""how far the folds are followed, and how far down the pitchfork: from there on what it parts is unstable anyway."""
-CUSP = (0.115992, 1954.913)
-"""Where the dumbbell's fold ends: the same on 40 and 80 elements, tests/study/test_curves.py."""
-PARTING = 221.3145
-"""Peclet number at which fold and pitchfork of the dumbbell meet, found on both curves alike."""
+WEAKEST, STRONGEST = 30.0, 2000.0
+"""how far the folds are followed,"""
+POLAR = (2.0 + 45.0) * (1.0 + 10.0**2) ** 2 / (2.0 * 10.0**2)
+"""up to where the ellipsoid's pitchfork, the sphere's own number (2 + k)(1 + c_s^2)^2/(2 c_s^2),"""
+SLIPPING = (220.0, 900.0)
+"""and the dumbbell's; below, what it parts is unstable anyway."""
+TURNS = {"ellipsoid": (41.5473, 66.9772), "dumbbell": (28.6405, 32.7154)}
+"""Ring amplitude and Peclet number where the folds turn,"""
+CUSPS = ((0.115992, 1954.913), (1.161233, 668.543))
+"""of the cusps where the dumbbell's fold meets a third one and that a fourth: the same on 40 and 80 elements,"""
+PARTING = {"ellipsoid": 620.2698, "dumbbell": 221.3145}
+"""and Peclet numbers at which fold and pitchfork meet, found on both curves alike;"""
+THIN = (2.37071, 487.5378)
+"""where the dumbbell's pitchfork comes back to it, at a neck of radius 0.003,"""
+STABLE, GONE = 860.0, 900.0
+"""and Peclet numbers between which no stable dumbbell is left beside its fold."""
 CHECKS = (
     *((amplitude, 450.0) for amplitude in (1.0, 1.36, 1.8, 3.0)),
     *((amplitude, 300.0) for amplitude in (1.2, 2.6, 4.5)),
@@ -55,23 +73,26 @@ CHECKS = (
 SAME = 1e-3
 """Neck radii of one and the same surface differ by less."""
 KICK = 1e-3
+BEYOND = "not in the paper"
 
 
 def run(out: Path, quick: bool) -> list[Row]:
     """The map, its curves, the dynamics, figure, table."""
     case = ss.scenario("guided-division", until=500.0)
     branch = resumed_branch(out / "branch", case, RING, 4.2, start=0.0, stability=False)
-    bounds = (400.0, MOST) if quick else (WEAKEST, STRONGEST)
+    bounds = (390.0, 510.0) if quick else (WEAKEST, STRONGEST)
     folds = zip(("ellipsoid", "dumbbell"), labelled(branch, "fold"), strict=True)
     curves = {name: followed(out, branch, fold.label, bounds) for name, fold in folds}
-    rows = check_folds(curves)
-    found = None
+    axes = f"{RING}=0:8:33", f"{PECLET}={LEAST:g}:{MOST:g}:12"
+    if quick:
+        axes = f"{RING}=0.5:3.5:5", f"{PECLET}=400:{MOST:g}:2"
+    found = ss.diagram(case, *axes, branches=3, out=out / "map", resume=True, workers=1 if quick else None)
+    rows = check_folds(curves) + check_map(found, curves)
     if not quick:
-        fork = labelled(branch, "pitchfork")[-1]
-        curves["slipping"] = followed(out, branch, fork.label, (SLIPPING, MOST))
-        axes = f"{RING}=0:8:33", f"{PECLET}={LEAST:g}:{MOST:g}:12"
-        found = ss.diagram(case, *axes, branches=3, out=out / "map", resume=True)
-        rows += check_map(found, curves) + check_cusp(curves)
+        forks = labelled(branch, "pitchfork")
+        curves["slipping"] = followed(out, branch, forks[-1].label, SLIPPING)
+        curves["polarizing"] = followed(out, branch, forks[0].label, (450.0, POLAR))
+        rows += check_weak_end(curves) + check_strong_end(curves) + check_necks(out, case)
     seen = dynamics(case, CHECKS[:3:2] if quick else CHECKS)
     rows += check_dynamics(seen, curves)
     draw(found, curves, seen, out)
@@ -83,6 +104,14 @@ def followed(out: Path, branch: ss.Branch, name: str, bounds: tuple[float, float
     return ss.curve(
         f"{branch.store}:{name}", PECLET, bounds[1], start=bounds[0], out=out / f"curve-{name}", resume=True
     )
+
+
+def special(kind: str, peclet: float, *curves: Curve) -> tuple[float, float]:
+    """Ring amplitude and Peclet number of the special point of a kind, on any of the curves, nearest to a Peclet number."""
+    found = [dict(zip(curve.keys, one.parameters.tolist(), strict=True)) for curve in curves
+             for one in curve.special_points if one.kind == kind]  # fmt: skip
+    nearest = min(found, key=lambda one: abs(one[PECLET] - peclet))
+    return nearest[RING], nearest[PECLET]
 
 
 def amplitude_at(curve: Curve, peclet: float) -> float:
@@ -132,21 +161,59 @@ def check_map(found: ss.Diagram, curves: dict[str, Curve]) -> list[Row]:
     ]  # fmt: skip
 
 
-def check_cusp(curves: dict[str, Curve]) -> list[Row]:
-    """Where the wedge ends, and where the dumbbell loses stability before its fold."""
-    dumbbell, slipping = curves["dumbbell"], curves["slipping"]
-    cusp = next(point for point in dumbbell.special_points if point.kind == "cusp")
-    order = [dumbbell.keys.index(key) for key in (RING, PECLET)]
-    ring, peclet = cusp.parameters[order]
-    meeting = min((point for curve in (dumbbell, slipping) for point in curve.special_points
-                   if point.kind == "fold-pitchfork"), key=lambda point: abs(point.parameters[order[1]] - PARTING))  # fmt: skip
-    words = "not in the paper"
+def check_weak_end(curves: dict[str, Curve]) -> list[Row]:
+    """Towards weak contractility the folds turn to stronger rings, one after the other."""
+    rows = []
+    for name, (amplitude, peclet) in TURNS.items():
+        ring, found = special("turn", peclet, curves[name])
+        rows.append(near(f"{name}'s fold turns at Pe", "not shown", found, peclet, 1e-2, BEYOND))
+        rows.append(near("and Delta_c", "not shown", ring, amplitude, 1e-2, BEYOND))
+    return rows
+
+
+def check_strong_end(curves: dict[str, Curve]) -> list[Row]:
+    """Towards strong contractility pitchforks part from both folds; the dumbbell's goes on to a cusp with a third fold."""
+    rows = [near(f"{name}'s pitchfork parts from its fold at Pe", paper,
+                 special("fold-pitchfork", PARTING[name], curves[name], curves[fork])[1], PARTING[name], 1e-2, verdict)
+            for name, fork, paper, verdict in (("ellipsoid", "polarizing", "not shown", BEYOND),
+                                               ("dumbbell", "slipping", "stable up to the fold", "differs"))]  # fmt: skip
+    rows.append(near("ellipsoid's pitchfork, at the sphere's own Pe, at Delta_c", "0",
+                     amplitude_at(curves["polarizing"], POLAR - 1e-3), 0.0, 1e-3, BEYOND))  # fmt: skip
+    for with_, (amplitude, peclet) in zip(
+        ("dumbbell's fold meets a third", "which meets a fourth"), CUSPS, strict=True
+    ):
+        ring, found = special("cusp", peclet, curves["dumbbell"])
+        rows.append(near(f"{with_} in a cusp at Delta_c", "not shown", ring, amplitude, 1e-4, BEYOND))
+        rows.append(near("and Pe", "not shown", found, peclet, 0.1, BEYOND))
+    apart = amplitude_at(curves["ellipsoid"], CUSPS[0][1]) - CUSPS[0][0]
+    rows.append(
+        Row("at the first cusp, ellipsoid's fold is away by Delta_c", "-", f"{apart:.3f}", "", apart > 0.3, BEYOND)
+    )
+    return rows
+
+
+def check_necks(out: Path, case: ss.Scenario) -> list[Row]:
+    """Dumbbells lose stability where their necks grow too thin, and beside their fold at all where contractility is strong."""
+    left = {}
+    for peclet in (STABLE, GONE):
+        name = f"branch-{peclet:g}"
+        # Oscillations set in beside the third fold, where some are not located.
+        at = case.with_overrides({PECLET: peclet})
+        found = resumed_branch(out / name, at, RING, 4.2, start=0.0, blind=(0.72, 0.78))
+        places = [fold.place for fold in labelled(found, "fold")]
+        left[peclet] = any(places[1] < point.place < places[2] and point.n_unstable == 0 for point in found.points)
+    thin = resumed_branch(
+        out / "branch-thin", case.with_overrides({PECLET: 495.0}), RING, 4.2, start=0.0, stability=False
+    )
+    fork = max(labelled(thin, "pitchfork"), key=lambda point: point.place)
+    curve = ss.curve(f"{thin.store}:{fork.label}", PECLET, 480.0, out=out / "curve-thin", resume=True)
+    ring, peclet = special("turn", THIN[1], curve)
+    told = f"Pe between {STABLE:g} and {GONE:g}"
     return [
-        near("dumbbell's fold ends in a cusp at Delta_c", "not shown", float(ring), CUSP[0], 1e-4, words),
-        near("and Pe", "not shown", float(peclet), CUSP[1], 0.1, words),
-        near("its pitchfork parts from the fold at Pe", "stable up to the fold", float(meeting.parameters[order[1]]),
-             PARTING, 1e-2, "differs"),
-    ]  # fmt: skip
+        Row("both surfaces stable up to", "beyond Pe = 500", told, "", left[STABLE] and not left[GONE], BEYOND),
+        near("dumbbells with thin necks slip from Pe", "stable", peclet, THIN[1], 1e-2, "differs"),
+        near("on, around Delta_c", "stable", ring, THIN[0], 1e-2, "differs"),
+    ]
 
 
 def dynamics(
@@ -167,7 +234,7 @@ def check_dynamics(seen: dict[tuple[float, float], tuple[float, float]], curves:
     """Two attractors where, by the curves, ellipsoid and dumbbell are stable; one elsewhere."""
     rows = []
     for (ring, peclet), (one, other) in seen.items():
-        ends = [amplitude_at(curve, peclet) for curve in curves.values()]
+        ends = [amplitude_at(curves[name], peclet) for name in ("ellipsoid", "dumbbell", "slipping") if name in curves]
         stable_from = max(end for end in ends[1:] if np.isfinite(end))
         expected = 2 if stable_from < ring < ends[0] else 1
         told = f"neck radii {one:.4f}, {other:.4f}"
@@ -180,7 +247,7 @@ def check_dynamics(seen: dict[tuple[float, float], tuple[float, float]], curves:
 
 
 def draw(
-    found: ss.Diagram | None,
+    found: ss.Diagram,
     curves: dict[str, Curve],
     seen: dict[tuple[float, float], tuple[float, float]],
     out: Path,
@@ -188,20 +255,20 @@ def draw(
     """Regimes with curves and checks; on the right the same curves as far as they were followed."""
     with style.house_style():
         figure, (left, right) = panels((1.25, 1.0), 88.0)
-        scales = next(iter(curves.values())).scenario.scales
-        if found is not None:
-            draw_regimes(left, found, found.regimes)
+        scales = found.scenario.scales
+        draw_regimes(left, found, found.regimes)
         for axes in (left, right):
-            for number, curve in enumerate(curves.values()):
-                draw_curve(axes, curve, (RING, PECLET), named=axes is left and number != 1)
+            for name, curve in curves.items():
+                # The ellipsoid's pitchfork parts from the fold beyond the map; one curve of each kind stands in the legend.
+                if axes is right or name != "polarizing":
+                    draw_curve(axes, curve, (RING, PECLET), named=axes is left and name in ("ellipsoid", "slipping"))
         for (ring, peclet), (one, other) in seen.items():
             left.plot(
                 ring, peclet, "o" if abs(one - other) > SAME else "x", color=style.INK, ms=4.0, mfc="none", zorder=4
             )
-        if found is None:
-            left.set(xlim=(0.0, 4.0), ylim=(400.0, MOST))
-        else:
-            left.set(xlim=(0.0, 8.12), ylim=(42.0, 518.0))
+        x, y = found.request.grid.x, found.request.grid.y
+        left.set(xlim=(max(x.start - 0.5 * x.step, 0.0), x.stop + 0.5 * x.step),
+                 ylim=(y.start - 0.5 * y.step, y.stop + 0.5 * y.step))  # fmt: skip
         left.set_xlabel(style.quantity_label(scales, RING))
         show_beyond(right)
         right.set_xlabel(style.quantity_label(scales, RING))
@@ -216,8 +283,8 @@ def draw(
 
 def show_beyond(axes: Axes) -> None:
     """The panel with the whole curves."""
-    axes.set(xscale="log", yscale="log", xlim=(0.09, 60.0), ylim=(45.0, 2.3e3))
-    axes.set_title("beyond the paper's range: the cusp")
+    axes.set(xscale="log", yscale="log", xlim=(0.09, 60.0), ylim=(25.0, 2.6e3))
+    axes.set_title("beyond the paper's range")
 
 
 if __name__ == "__main__":

@@ -146,7 +146,7 @@ def test_default_directory_is_never_one_in_use(shell: Shell):
         (["--out", "foreign"], ["foreign", "holds other files"]),
         (["--out", "file"], ["file", "is not a directory"]),
         (["--out", "foreign", "--resume"], ["foreign", "holds other files"]),
-        (["--out", "taken", "--resume", "-s", "peclet=3"], ["taken", "active_tension is 450.0, not 3.0"]),
+        (["--out", "taken", "--resume", "-s", "peclet=3"], ["taken", "peclet is 450.0, not 3.0"]),
         (["--out", "damaged", "--resume"], ["damaged/frames/000010.npz", "is damaged", "delete it"]),
     ],
 )

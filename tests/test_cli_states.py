@@ -175,3 +175,9 @@ def test_bad_curve_is_one_line(shell: Shell, sphere: str, arguments: list[str], 
     Path("foreign/thesis.tex").write_text("precious")
     assert part in one_complaint(shell("curve", f"{sphere}:pitchfork-1", *arguments))
     assert [str(file) for file in Path().rglob("*") if file.is_file()] == ["foreign/thesis.tex"]
+
+
+def test_no_key_is_no_sensitivity(capsys: pytest.CaptureFixture[str]):
+    command = ("steady", "polar-swimmer", "--state", "trivial", "-s", "elements=20", "--sensitivity")
+    for keys in ("", "peclet,"):
+        assert "must name parameters" in one_complaint(Shell(capsys)(*command, keys))

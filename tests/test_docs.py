@@ -102,7 +102,7 @@ def test_a_map_is_read_as_the_page_says():
     axes = ("peclet=20:26:2", "inverse_hydrodynamic_length=1:2:2")
     ss.diagram(ss.scenario("polar-swimmer"), *axes, out="results/swimmers", workers=1)
     names: dict[str, Any] = {}
-    exec(blocks(ROOT / "docs" / "how-to" / "map-shape-space.md", "python")[-1], names)
+    exec(blocks(ROOT / "docs" / "how-to" / "map-shape-space.md", "python")[-2], names)
     assert names["found"].converged == 2
 
 

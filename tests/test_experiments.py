@@ -7,9 +7,6 @@ import pytest
 
 EXPERIMENTS = Path(__file__).resolve().parents[1] / "experiments"
 NAMES = sorted(path.stem for path in EXPERIMENTS.glob("*.py") if path.stem != "common")
-LONG = ("fig_2", "fig_4", "fig_6", "fig_7a", "fig_7c")
-"""These take long in their quick form too."""
-QUICK = [pytest.param(name, marks=pytest.mark.slow) if name in LONG else name for name in NAMES]
 FULL = [name for name in NAMES if name != "fig_5abcd"]
 """A map of 250,000 states is run by hand."""
 
@@ -24,7 +21,7 @@ def assert_holds(name: str, out: Path, quick: bool) -> None:
 
 
 @pytest.mark.usefixtures("own_models", "pages_checked")
-@pytest.mark.parametrize("name", QUICK)
+@pytest.mark.parametrize("name", NAMES)
 def test_quick(name: str, tmp_path: Path):
     assert_holds(name, tmp_path, quick=True)
 

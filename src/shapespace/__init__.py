@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from shapespace.study.curve_store import open_curve as open_curve
     from shapespace.study.curves import curve as curve
     from shapespace.study.dataset import open_dataset as open_dataset
+    from shapespace.study.diagram_points import state_at as state_at
     from shapespace.study.diagram_store import Diagram as Diagram
     from shapespace.study.diagram_store import open_diagram as open_diagram
     from shapespace.study.diagrams import diagram as diagram
@@ -59,6 +60,7 @@ _HOMES = {
     "Diagram": "study.diagram_store",
     "diagram": "study.diagrams",
     "open_diagram": "study.diagram_store",
+    "state_at": "study.diagram_points",
     "open_dataset": "study.dataset",
     "Run": "study.run",
     "open_run": "study.run",

@@ -106,12 +106,12 @@ def test_a_map_is_shown_without_its_damaged_tiles(
     open_page(browser, serve(damaged), 0)
     browser.choose("#choose-of", name if name != "outcome" else "velocity")
     browser.settle()
-    assert f"numbers in it are damaged ({name}, tile 0,0" in trouble(browser)
+    assert f"{name}/c/0/0: numbers of tile 0, 0 are damaged" in trouble(browser)
     assert has_shape(browser)
     canvas = "document.querySelector('#diagram canvas')"
     browser.choose("#choose-of", "area")
     browser.settle()
-    assert trouble(browser).count("in it are damaged") == 1
+    assert trouble(browser).count("0 are damaged") == 1
     browser.choose("#choose-of", "velocity")
     browser.settle()
     corner, rest = browser.run(

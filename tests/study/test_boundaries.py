@@ -145,7 +145,7 @@ def test_folds_of_the_map_are_those_of_a_branch(division: Diagram):
 def test_bad_numbers_of_branches(tmp_path: Path):
     axes = ("ring_amplitude=0.9:2.7:7", "peclet=440:450:2")
     for arguments, part in (
-        ({"branches": -1}, "--branches -1: must be 1 to 16"),
+        ({"branches": -1}, "--branches -1: must be 1 to 16, or 0 for the named states alone"),
         ({"branches": 17}, "--branches 17"),
         ({"origins": ("nowhere",)}, "give that too"),
         ({"branches": 2, "origins": ("nowhere",)}, "nowhere"),

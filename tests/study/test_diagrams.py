@@ -22,7 +22,6 @@ from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.diagram_store import CODES, Diagram, DiagramStore, open_diagram
 from shapespace.study.diagrams import diagram
-from shapespace.study.grid import Axis, Grid
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.steady import steady
 from shapespace.study.tiles import Done, compute_tile
@@ -174,24 +173,25 @@ def test_an_adaptive_map_draws_its_regimes(adaptive: Diagram):
     plot_diagram(adaptive, "velocity")
 
 
+def test_searches_find_what_no_fold_connects(tmp_path: Path):
+    """Swimmers leave the sphere at a pitchfork, which no sheet of spheres leads over; what is asked for is stored."""
+    axes, choices = ("peclet=24:30:3", "turnover_rate=8:9:2"), {"states": ("trivial",), "branches": 2, "workers": 1}
+    alone = diagram(swimmer(), *axes, out=tmp_path / "alone", **choices)
+    found = diagram(swimmer(), *axes, deflate=1, out=tmp_path / "searched", **choices)
+    assert (alone.dataset["n_states"] == 1).all()
+    assert (found.dataset["n_states"] == 2).all()
+    speeds = abs(found.dataset["velocity"])
+    assert ((speeds > 0.5).sum("state") == 1).all()
+    assert found.request.deflate == 1
+    assert open_diagram(found.store).request == found.request
+    with pytest.raises(StoreError, match="deflate is 1, not 2"):
+        diagram(swimmer(), *axes, deflate=2, out=found.store, resume=True, **choices)
+
+
 def test_no_state_at_all_says_so(tmp_path: Path):
     found = diagram(swimmer(), "peclet=5:10:2", "inverse_hydrodynamic_length=1:2:2", out=tmp_path / "d", workers=1)
     assert found.converged == 0
     assert [one["outcome"] for one in found.failed] == ["no-state"] * 4
-
-
-def test_tiles_cover_the_grid_once():
-    for counts in ((2, 500), (9, 10), (11, 26), (101, 77)):
-        grid = Grid(*(Axis(key, 0.0, 1.0, count) for key, count in zip(("a", "b"), counts, strict=True)))
-        met = np.zeros(grid.shape, int)
-        for tile in grid.tiles:
-            span = grid.span(tile)
-            met[span] += 1
-            i, j = grid.x.anchors[tile[0]], grid.y.anchors[tile[1]]
-            assert span[0].start <= i < span[0].stop
-            assert span[1].start <= j < span[1].stop
-            assert met[span].size <= 625
-        assert (met == 1).all()
 
 
 def without(stored: Diagram, out: Path, tiles: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
@@ -316,14 +316,6 @@ def test_a_job_of_the_script_computes_a_map(stored: Diagram, tmp_path: Path, mon
     assert_same(tmp_path / "d", stored)
 
 
-def test_no_scheduler_is_bad_input(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("shapespace.study.cluster.SECONDS", 0.5)
-    for address in ("tcp://127.0.0.1:9", "nonsense://x"):
-        with pytest.raises(InputError, match="no scheduler answers"):
-            diagram(swimmer(), X, Y, out=tmp_path / "d", dask=address)
-    assert not (tmp_path / "d").exists()
-
-
 def test_a_worker_meets_no_store(tmp_path: Path):
     with pytest.raises(StoreError, match="is not a directory"):
         compute_tile(tmp_path / "none", (0, 0))
@@ -360,6 +352,8 @@ def test_bad_axes_are_refused(tmp_path: Path, x: str, part: str):
         ({"states": ("default", "default")}, "must name different states"),
         ({"states": ("upside-down",)}, "upside-down"),
         ({"adaptive": True, "branches": 2}, "--adaptive and --branches 2"),
+        ({"deflate": 2}, "--deflate 2: adds states to those of --branches N"),
+        ({"branches": 2, "deflate": 65}, "--deflate 65: must be 1 to 64"),
     ],
 )
 def test_bad_requests_are_refused(tmp_path: Path, arguments: dict[str, object], part: str):

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from tests.study.test_diagram_cluster import OWN
 
 from shapespace.analysis import sweeping
 from shapespace.analysis.stationary import Stationary
@@ -27,6 +28,7 @@ from shapespace.base.problem import AbstractProblem
 from shapespace.numerics.newton import Root
 from shapespace.study.diagram_store import Diagram, DiagramStore, open_diagram
 from shapespace.study.diagrams import diagram
+from shapespace.study.plugins import import_file
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.tiles import Done
 from shapespace.study.workers import MAX_DEATHS, Workers
@@ -170,16 +172,68 @@ def test_a_disk_that_takes_no_more(undisturbed: Diagram, tmp_path: Path):
     assert not [path for path in out.rglob("*") if "tmp" in path.name or "partial" in path.name]
 
 
+def command(out: Path) -> list[str]:
+    """That computes on with two processes."""
+    return [sys.executable, "-m", "shapespace", "diagram", "polar-swimmer", "-s",
+            *(f"{key}={value}" for key, value in SETTINGS.items()), "-x", X, "-y", Y, "--workers", "2",
+            "--out", str(out), "--resume"]  # fmt: skip
+
+
+def test_a_killed_client(undisturbed: Diagram, tmp_path: Path):
+    """Its processes end with it; what they finished is not computed again, and the map is the same in the end."""
+    out, deadline = begun(undisturbed, tmp_path / "d"), time.monotonic() + SECONDS
+    client = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    while not chunks(out):
+        assert client.poll() is None, "it ended by itself"
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+    children = Path(f"/proc/{client.pid}/task/{client.pid}/children").read_text().split()
+    client.kill()
+    client.wait()
+    while any(Path(f"/proc/{pid}").exists() for pid in children):
+        assert time.monotonic() < deadline, "a worker survives"
+        time.sleep(0.02)
+    kept = chunks(out)
+    assert len(DiagramStore.open(out).manifest["resumed"]) == 1
+    assert len(resumed(out)) == 4 - len(kept)
+    assert kept == {path: time for path, time in chunks(out).items() if path in kept}
+    assert_same(out, undisturbed)
+
+
+def test_all_workers_are_killed(undisturbed: Diagram, tmp_path: Path):
+    """As soon as one has finished a tile every one that lives or is started dies: the command gives up, and resumes."""
+    out, is_over = begun(undisturbed, tmp_path / "d"), threading.Event()
+    tiles = DiagramStore.open(out).missing_tiles
+
+    def kill() -> None:
+        while not is_over.wait(0.005):
+            for pid in workers.pids if chunks(out) else ():
+                with suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+
+    with Workers(2) as workers:
+        killer = threading.Thread(target=kill)
+        killer.start()
+        try:
+            with pytest.raises(WorkerError, match=r"3 processes died over the same points .*: resume with fewer"):
+                list(workers.map(out, tiles))
+        finally:
+            is_over.set()
+            killer.join()
+    kept = chunks(out)
+    assert 1 <= len(kept) < 4
+    assert len(resumed(out)) == 4 - len(kept)
+    assert kept == {path: time for path, time in chunks(out).items() if path in kept}
+    assert_same(out, undisturbed)
+
+
 @pytest.mark.slow
 def test_whatever_is_killed_at_random(undisturbed: Diagram, tmp_path: Path):
     """Workers and clients of one command after the other: nothing finished is computed again, nothing is left running."""
     out, chance = begun(undisturbed, tmp_path / "d"), random.Random(3)
-    command = [sys.executable, "-m", "shapespace", "diagram", "polar-swimmer", "-s",
-               *(f"{key}={value}" for key, value in SETTINGS.items()), "-x", X, "-y", Y, "--workers", "2",
-               "--out", str(out), "--resume"]  # fmt: skip
     deadline, killed, known = time.monotonic() + SECONDS, [0, 0], chunks(out)
     while DiagramStore.open(out).missing_tiles:
-        client = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        client = subprocess.Popen(command(out), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         children = Path(f"/proc/{client.pid}/task/{client.pid}/children")
         started: set[int] = set()
         before = len(chunks(out))
@@ -285,11 +339,24 @@ def test_workers_and_the_scheduler_of_a_cluster_are_lost(undisturbed: Diagram, t
 def test_another_version_on_a_worker(tmp_path: Path, daemons: Daemons):
     """It is refused before anything is written."""
     old = tmp_path / "old.py"
-    old.write_text(
-        "import shapespace.study.cluster as cluster\ncluster.own_versions = lambda: {'shapespace': '0.0.9'}\n"
-    )
+    old.write_text("import shapespace.study.cluster as cluster\ncluster.own_version = lambda: '0.0.9'\n")
     daemons.start_worker("--preload", str(old))
     workers_of(daemons.address, 1)
     with pytest.raises(InputError, match=r"has shapespace 0\.0\.9, not .*; install the same version there"):
         diagram(swimmer(), X, Y, out=tmp_path / "d", dask=daemons.address)
     assert not (tmp_path / "d").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("own_models")
+def test_a_worker_learns_models_of_ones_own(tmp_path: Path, daemons: Daemons):
+    """It is started where nobody knows of them."""
+    daemons.start_worker()
+    workers_of(daemons.address, 1)
+    file = tmp_path / "own.py"
+    file.write_text(OWN)
+    import_file(file)
+    case = scenario("dragged-swimmer", **SETTINGS)
+    axes = ("peclet=150:160:2", "inverse_hydrodynamic_length=1:2:2")
+    found = diagram(case, *axes, out=tmp_path / "d", dask=daemons.address)
+    assert found.converged == 4

@@ -73,7 +73,7 @@ def test_an_interrupted_search_goes_on_as_if_it_had_not_been(stored: Search, tmp
     whole = search_states(swimmer(), max_tries=7, out=tmp_path / "part", resume=True)
     assert story(whole) == story(stored)
     assert len(search_states(swimmer(), max_tries=5, out=tmp_path / "part", resume=True).tried) == 7
-    with pytest.raises(StoreError, match="active_tension is 24"):
+    with pytest.raises(StoreError, match="peclet is 24"):
         search_states(swimmer(25.0), out=tmp_path / "part", resume=True)
     with pytest.raises(StoreError, match="starts are"):
         search_states(swimmer(), origins=[stored.store or ""], out=tmp_path / "part", resume=True)

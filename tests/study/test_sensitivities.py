@@ -50,10 +50,13 @@ def check(state: Steady, keys: list[str]) -> None:
         slopes, moved = differences(state, key)
         value = max(abs(float(state.scenario.values()[key])), 0.1)
         for name, row in found.items():
-            if name == "ring_position":  # known to the root of the round-off only, too little for differences
-                continue
             size = abs(state.observables["dissipation" if name == "energy_residual" else name])
             bound = 1e-6 * abs(slopes[name]) + 1e-8 * (1.0 + size) / value
+            if name == "ring_position":
+                if abs(state.observables[name] - 0.5) < 1e-3:
+                    continue  # a mirror image of the place is as good, and round-off chooses between them
+                # Where a maximum is, is known to the root of the round-off only.
+                bound = 1e-3 * abs(slopes[name]) + 1e-3 / value
             assert abs(row[key] - slopes[name]) < bound, (name, key, row[key], slopes[name])
         np.testing.assert_allclose(outline[..., i], moved, rtol=1e-6, atol=1e-7 / value)
 

@@ -17,7 +17,7 @@ from shapespace.base.errors import StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study import files
 from shapespace.study.frame import DAMAGE, Frame, decode_frame, encode_frame
-from shapespace.study.records import FORMAT_VERSION
+from shapespace.study.manifests import FORMAT_VERSION
 from shapespace.study.scenario import Scenario, scenario
 from shapespace.study.store import RunStore
 
@@ -186,7 +186,7 @@ def test_resumed_store_goes_on_and_may_go_further(tmp_path: Path):
 @pytest.mark.parametrize(
     ("changes", "difference"),
     [
-        ({"peclet": 300}, "active_tension is 450.0, not 300.0"),
+        ({"peclet": 300}, "peclet is 450.0, not 300.0"),
         ({"initial_background": 0.5}, "initial_background is 1.0, not 0.5"),
         ({"elements": 80}, "elements is 40, not 80"),
         ({"dt": 1e-3}, "dt is 0.0, not 0.001"),

@@ -11,6 +11,7 @@ other grids.
 
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 
@@ -40,6 +41,8 @@ NEARLY = 0.1
 """States on different discretisations that differ by more are two."""
 SYMMETRIC = 1e-6
 """States that differ less from their mirror image are their own."""
+INDEPENDENT = 1e-5
+"""Monomials of which less than this share is no combination of the others, at the places given, are left out."""
 MAX_MOVES = 6
 MAX_TRIES = 2
 
@@ -206,6 +209,25 @@ def lagrange_weights(distances: Array) -> Array:
     shares = distances / apart
     np.fill_diagonal(shares, 1.0)
     return np.asarray(shares.prod(axis=1))
+
+
+def polynomial_weights(offsets: Array) -> Array:
+    """Of values at places (m, 2) in the value at the origin of the polynomial of least degree through them.
+
+    Of its monomials x^a y^b, a, b < 4, those are taken that the places tell apart, of low degree first; where they are fewer than
+    the places the weights are the smallest that are exact for all of them.
+    """
+    scaled = offsets / np.maximum(np.abs(offsets).max(axis=0), np.finfo(float).tiny)
+    taken, basis = [], np.zeros((len(scaled), 0))
+    for a, b in sorted(product(range(LONGEST), repeat=2), key=sum):
+        values = scaled[:, 0] ** a * scaled[:, 1] ** b
+        rest = values - basis @ (basis.T @ values)
+        if np.linalg.norm(rest) > INDEPENDENT * np.linalg.norm(values):
+            taken.append(values)
+            basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
+    wanted = np.zeros(len(taken))
+    wanted[0] = 1.0
+    return np.asarray(np.linalg.lstsq(np.array(taken), wanted)[0])
 
 
 def _is_near(state: Stationary, other: Stationary) -> bool:

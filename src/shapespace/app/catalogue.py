@@ -6,7 +6,7 @@ from threading import Event, Lock
 from typing import TYPE_CHECKING, Any
 
 from shapespace.base.errors import InputError, StoreError
-from shapespace.study.records import holds_store, noun_of
+from shapespace.study.manifests import holds_store, noun_of
 
 if TYPE_CHECKING:
     from shapespace.app.source import AbstractSource

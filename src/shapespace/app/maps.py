@@ -16,7 +16,7 @@ from shapespace.study.curve_store import Curve, CurveStore, collected, outline
 from shapespace.study.diagram_numbers import DiagramNumbers
 from shapespace.study.diagram_store import ABOUT_SOLUTION, CODES, CURVES, OUTCOME, REGIME, UNSTABLE, DiagramStore
 from shapespace.study.frame import Array, Frame
-from shapespace.study.records import holds_store
+from shapespace.study.manifests import holds_store
 from shapespace.study.regimes import describe, telling_aspects
 from shapespace.study.scenario import Scenario
 from shapespace.study.telling import most_telling
@@ -130,9 +130,8 @@ class DiagramSource(AbstractSource):
         return {"name": REGIME, "values": exact(values), "damage": self._damage[REGIME], "kinds": about}
 
     def state(self, place: str) -> dict[str, Any]:
-        number, i, j = self._place(place)
-        store = self.store()
-        request = store.request
+        request = self.store().request
+        number, i, j = request.place(place)
         keys = request.grid.keys
         x, y = request.grid.values(i, j).ravel().tolist()
         there = self.numbers().at(number, i, j)
@@ -171,7 +170,7 @@ class DiagramSource(AbstractSource):
             if place not in has_shape:
                 continue
             try:
-                self.states().state(self._place(place))
+                self.states().state(self.store().request.place(place))
             except StoreError:
                 # Not found again: the page says that it is not in the file.
                 continue
@@ -197,24 +196,25 @@ class DiagramSource(AbstractSource):
         # Imported late, as below: most stores are opened without a solver.
         from shapespace.study.dataset import profile_of
 
-        with self.computing:
-            found = self.states().state(self._place(place))
-            at, frame = found.scenario, found.frame
-            fields = profile_of(at, frame)
         store = self.store()
         request = store.request
-        values = request.grid.values(*self._place(place)[1:]).ravel().tolist()
+        number, i, j = request.place(place)
+        with self.computing:
+            found = self.states().state((number, i, j))
+            at, frame = found.scenario, found.frame
+            fields = profile_of(at, frame)
+        values = request.grid.values(i, j).ravel().tolist()
         return described(
             at,
             frame,
             fields,
             store,
-            f"{self.path.resolve()}:{self.states().origin(self._place(place))}",
+            f"{self.path.resolve()}:{place}",
             vary=request.grid.x.key,
             stop=request.grid.x.stop,
             changes=dict(zip(request.grid.keys, values, strict=True)),
             place=place,
-            title=request.labels[self._place(place)[0]],
+            title=request.labels[number],
             can_compute=True,
         )
 
@@ -222,7 +222,7 @@ class DiagramSource(AbstractSource):
         return None
 
     def resting(self, place: str) -> tuple[Scenario, Frame]:
-        found = self.states().state(self._place(place))
+        found = self.states().state(self.store().request.place(place))
         return found.scenario, found.frame
 
     def states(self) -> "DiagramStates":
@@ -233,17 +233,6 @@ class DiagramSource(AbstractSource):
 
             self._states = DiagramStates(self.store(), self.numbers())
         return self._states
-
-    def _place(self, text: str) -> tuple[int, int, int]:
-        store = self.store()
-        parts = text.split(",")
-        limits = (len(store.request.labels), *store.request.grid.shape)
-        if len(parts) != 3 or not all(part.isdecimal() for part in parts):
-            raise InputError(f"{text[:20]!r}: is no point of this diagram; give STATE,I,J.")
-        state, i, j = map(int, parts)
-        if not (state < limits[0] and i < limits[1] and j < limits[2]):
-            raise InputError(f"{text[:40]}: is no point of this diagram, which has {' by '.join(map(str, limits))}.")
-        return state, i, j
 
     def numbers(self) -> DiagramNumbers:
         """What is stored at its points, as it is now."""

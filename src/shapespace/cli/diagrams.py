@@ -22,6 +22,7 @@ from shapespace.cli.shared import (
     print_lines,
     read_settings,
     tell,
+    whole,
 )
 
 if TYPE_CHECKING:
@@ -56,13 +57,21 @@ def diagram_command(
     branches: Annotated[
         int,
         Parameter(
-            metavar="N", help="Up to N states at each point: all that folds connect with those of --state and --from."
+            metavar="N",
+            converter=whole,
+            help="Up to N states at each point: all that folds connect with those of --state, --from and --deflate.",
         ),
     ] = 0,
     origins: Annotated[
         tuple[str, ...],
         Parameter(name="--from", metavar="STORE[:LABEL]", help="With --branches: stored states to start from as well."),
     ] = (),
+    deflate: Annotated[
+        int,
+        Parameter(
+            metavar="M", converter=whole, help="With --branches: search by deflation at M places spread over the map."
+        ),
+    ] = 0,
     adaptive: Annotated[
         bool,
         Parameter(
@@ -74,7 +83,8 @@ def diagram_command(
         bool, Parameter(help="Follow the folds and branch points that bound regions; drawn over the map by `plot`.")
     ] = False,
     workers: Annotated[
-        int | None, Parameter(metavar="N", help="Processes on this machine; the default is one for each core.")
+        int | None,
+        Parameter(metavar="N", converter=whole, help="Processes on this machine; the default is one for each core."),
     ] = None,
     dask: Annotated[
         str | None,
@@ -101,21 +111,22 @@ def diagram_command(
             rate = _Rate(display, path)
             found = diagram(
                 chosen, x, y, out=path, states=state.split(","), stability=stability, boundaries=boundaries,
-                branches=branches, origins=origins, adaptive=adaptive,
+                branches=branches, origins=origins, adaptive=adaptive, deflate=deflate,
                 workers=workers, dask=dask, resume=resume,
-                ready=rate.begin, progress=rate.update, curve_progress=rate.follow,
+                ready=rate.begin, progress=rate.update, curve_progress=rate.follow, waiting=rate.wait,
             )  # fmt: skip
     except KeyboardInterrupt:
         tell(f"interrupted; to continue: {again(path)}")
         return INTERRUPTED
     except WorkerError as error:
-        tell(f"{error} To continue: {again(path)}")
+        elsewhere = "" if dask is None else ", here or with the --dask ADDRESS of a cluster that lives"
+        tell(f"{error} To continue{elsewhere}: {again(path, '--dask')}")
         return GAVE_UP
     seconds = monotonic() - began
     if as_json:
-        print(json.dumps(_record(found, rate.computed, seconds), allow_nan=False))
+        print(json.dumps(_record(found, rate, seconds), allow_nan=False))
     else:
-        _summarise(found, rate.computed, seconds)
+        _summarise(found, rate, seconds)
     if not found.converged:
         tell("no point of the grid has a state of this name; choose other values, or another --state.")
         return GAVE_UP
@@ -127,8 +138,11 @@ class _Rate:
 
     def __init__(self, display: ProgressDisplay, path: Path) -> None:
         self._display, self._path = display, path
-        self._done, self._total, self._began = 0, 0, monotonic()
-        self._points = self.computed = 0
+        self._done, self._total, self._points = 0, 0, 0
+        self._start = self._last = monotonic()
+        self._began: float | None = None
+        self._workers = ""
+        self.computed = 0
 
     def begin(self, done: int, total: int) -> None:
         """Take note of what is there already."""
@@ -140,17 +154,37 @@ class _Rate:
         """Take note of a boundary."""
         self._display.update(f"followed a curve of {found.of}s", is_notable=True)
 
+    def wait(self, workers: int) -> None:
+        """Take note of how many workers a cluster has."""
+        self._workers = f", {workers} worker{'s' * (workers != 1)}"
+        if not workers:
+            self._display.update("waiting for workers: the scheduler has none", self._share)
+
     def update(self, tile: "Done") -> None:
         """Take note of a tile."""
+        self._last = monotonic()
+        if self._began is None:
+            # What came before the first tile is no measure of the others.
+            self._began = self._last - tile.seconds
         self._points += tile.points
         self.computed += tile.points - tile.inferred
+        rate = self._points / max(self._last - self._began, 1e-9)
         done = self._done + self._points
-        rate = self._points / max(monotonic() - self._began, 1e-9)
-        text = f"{done} of {self._total} points, {rate:.1f} a second, {(self._total - done) / rate:.0f} s left"
-        self._display.update(text, done / self._total)
+        left = (self._total - done) / rate
+        text = f"{done} of {self._total} points, {rate:.1f} a second, {left:.0f} s left{self._workers}"
+        self._display.update(text, self._share)
+
+    @property
+    def _share(self) -> float:
+        return (self._done + self._points) / max(self._total, 1)
+
+    @property
+    def whole(self) -> float | None:
+        """Computed points a second from the start of the command to the last one, None where there are none."""
+        return self.computed / max(self._last - self._start, 1e-9) if self.computed else None
 
 
-def _record(found: "Diagram", computed: int, seconds: float) -> dict[str, Any]:
+def _record(found: "Diagram", rate: _Rate, seconds: float) -> dict[str, Any]:
     """What --json prints."""
     return {
         "store": str(found.store),
@@ -159,11 +193,11 @@ def _record(found: "Diagram", computed: int, seconds: float) -> dict[str, Any]:
         "keys": [*found.request.grid.keys],
         "states": [*found.request.labels],
         "points": found.points,
-        "computed": computed,
+        "computed": rate.computed,
         "converged": found.converged,
         "inferred": found.inferred,
         "seconds": seconds,
-        "points_per_second": computed / seconds,
+        "points_per_second": rate.whole,
         "boundaries": [_boundary(one) for one in found.boundaries],
         "unexplained": None if found.unexplained is None else len(found.unexplained),
         "failed": found.failed,
@@ -183,7 +217,7 @@ def _boundary(found: "Curve") -> dict[str, Any]:
     }
 
 
-def _summarise(found: "Diagram", computed: int, seconds: float) -> None:
+def _summarise(found: "Diagram", rate: _Rate, seconds: float) -> None:
     from collections import Counter
 
     counts = Counter(one["outcome"] for one in found.failed).most_common()
@@ -191,7 +225,7 @@ def _summarise(found: "Diagram", computed: int, seconds: float) -> None:
     ends = "".join(f", {count} {name}" for name, count in counts)
     print_lines(
         f"{found.points} points: {found.converged} converged{ends}",
-        f"computed {computed} in {seconds:.1f} s, {computed / seconds:.1f} a second",
+        f"computed {rate.computed} in {seconds:.1f} s{'' if rate.whole is None else f', {rate.whole:.1f} a second'}",
         *(f"bounded by {one.of}s: {one.store}" for one in found.boundaries),
         *([f"{len(found.unexplained)} changes between neighbours lie on no such curve"] if found.unexplained else []),
         f"stored in {found.store}",

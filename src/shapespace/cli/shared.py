@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from cyclopts import App, Parameter
+from cyclopts import App, Parameter, Token
 
 from shapespace.base.errors import InputError
 
@@ -71,7 +71,8 @@ StartFrom = Annotated[
     Parameter(
         name="--from",
         metavar="STORE[:LABEL]",
-        help="Start from the last state of a stored run, or a labelled one of a branch, a curve or a search.",
+        help="Start from the last state of a stored run, a labelled one of a branch, a curve or a search, or that at a point "
+        "STATE,I,J of a diagram.",
     ),
 ]
 
@@ -104,15 +105,34 @@ def read_values(text: str | None) -> list[float]:
         raise InputError(f"--at {text}: must be numbers with commas between them, e.g. --at 1.5,2.") from None
 
 
-def again(path: Path) -> str:
-    """The command that goes on with what was interrupted: the same one, with where and how."""
+def whole(_: object, tokens: Sequence[Token]) -> int:
+    """Converter of an option that is a whole number: others are refused, not rounded."""
+    text = tokens[0].value
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"{text} must be a whole number; give one.") from None
+
+
+def again(path: Path, without: str | None = None) -> str:
+    """The command that goes on with what was interrupted: the same one, with where and how.
+
+    without: an option whose value is good no more.
+    """
     words = [word for word in sys.argv[1:] if word != "--resume"]
+    if without is not None:
+        places = [i for i, word in enumerate(words) if word == without]
+        words = [
+            word
+            for i, word in enumerate(words)
+            if not (i in places or i - 1 in places or word.startswith(f"{without}="))
+        ]
     return shlex.join(["shapespace", *words, *([] if "--out" in words else ["--out", str(path)]), "--resume"])
 
 
 def find_scenario(name_or_file: str) -> "Scenario":
     """The built-in scenario of this name, or that of a file or of a store."""
-    from shapespace.study.records import holds_store
+    from shapespace.study.manifests import holds_store
     from shapespace.study.scenario import load_scenario, scenario, scenario_names
 
     # Names first: runs are stored in folders named as their scenarios.

@@ -51,9 +51,9 @@ def steady_command(
         ),
     ] = None,
     sensitivity: Annotated[
-        str,
+        str | None,
         Parameter(metavar="KEYS", help="Derivatives of all observables by these parameters, with commas between them."),
-    ] = "",
+    ] = None,
     out: Annotated[Path | None, Parameter(metavar="DIR", help="New directory to store the state in.")] = None,
     as_json: AsJson = False,
 ) -> int:
@@ -73,7 +73,9 @@ def steady_command(
     found = steady(chosen, state=state or "default", start=start)
     rates, slopes = None, dict[str, dict[str, float]]()
     if found.outcome.is_success:
-        keys = [key.strip() for key in sensitivity.split(",")] if sensitivity else []
+        keys = [] if sensitivity is None else [key.strip() for key in sensitivity.split(",")]
+        if "" in keys:
+            raise InputError(f"--sensitivity {sensitivity!r}: must name parameters, e.g. --sensitivity peclet,tension.")
         slopes = found.sensitivity((), keys) if keys else {}
         spectrum = found.spectrum()
         rates = Rates.of(spectrum, found.scenario)

@@ -8,6 +8,7 @@ from typing import Any, Protocol, Self, TypeVar
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.branch_point import BranchPoint, decode_point, encode_point
+from shapespace.study.manifests import read_manifest, scenario_of
 from shapespace.study.presenting import Plotted, Summary
 from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import Scenario
@@ -45,9 +46,9 @@ class AbstractPathStore(AbstractRecordStore[P]):
     def resume(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
         """A stored path to continue. Checks every point; scenario and request must be the same."""
         path = Path(path)
-        manifest = cls._read_manifest(path)
+        manifest = read_manifest(path, cls.noun, cls.folder)
         stored, wanted = manifest.get(cls.noun), dict(request)
-        difference = cls._scenario_of(path, manifest).difference(scenario)
+        difference = scenario_of(path, cls.noun, manifest).difference(scenario)
         if not isinstance(stored, dict):
             raise StoreError(f"{path / 'store.json'}: is damaged (no {cls.noun}); restore it, or choose another --out.")
         for name, value in wanted.items():

@@ -19,7 +19,7 @@ from shapespace.study.branch_store import START, Branch, BranchStore, collected
 from shapespace.study.course import Course
 from shapespace.study.engine import Engine
 from shapespace.study.landmarks import Surveyor
-from shapespace.study.records import holds_store
+from shapespace.study.manifests import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.settling import key_values
 from shapespace.study.starts import Start, find_start

@@ -29,7 +29,7 @@ from shapespace.study.curve_store import Curve, CurvePoint, CurveStore, collecte
 from shapespace.study.engine import state_of
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.keys import MODELS
-from shapespace.study.records import holds_store
+from shapespace.study.manifests import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.settling import key_values
 from shapespace.study.starts import Start, find_start

@@ -16,8 +16,8 @@ from shapespace.models.open_membrane import local_spontaneous_curvature
 from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, even_points, state_of
 from shapespace.study.frame import Frame
+from shapespace.study.manifests import CONVENTIONS
 from shapespace.study.observables import FLOWS
-from shapespace.study.records import CONVENTIONS
 from shapespace.study.scenario import Scenario
 from shapespace.study.store import RunStore
 

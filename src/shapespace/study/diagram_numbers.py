@@ -1,22 +1,17 @@
 """The numbers of a stored diagram, read part by part: of a map of many points all of them take long."""
 
 import asyncio
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-import zarr
 
 from shapespace.base.errors import StoreError
 from shapespace.base.scales import QUANTITIES
+from shapespace.study.diagram_arrays import damaged_tiles, open_arrays, reading
 from shapespace.study.diagram_store import DiagramStore
-from shapespace.study.files import storage
 from shapespace.study.frame import Array
-
-TOGETHER = {"codec_pipeline.batch_size": 64}
-"""Chunks that are decoded in one go: half the time of one by one."""
 
 
 class DiagramNumbers:
@@ -27,12 +22,7 @@ class DiagramNumbers:
 
     def __init__(self, store: DiagramStore) -> None:
         self._path, self._is_finished, self._grid = store.path, store.outcome is not None, store.request.grid
-        with storage(store.path), zarr.config.set(TOGETHER):
-            try:
-                group: Any = zarr.open_group(store.path, mode="r")
-                found = {name: array for name, array in group.arrays() if array.ndim >= 2}
-            except (ValueError, KeyError, FileNotFoundError) as error:
-                raise StoreError(f"{store.path / 'zarr.json'}: is damaged or missing ({error}).") from None
+        found = {name: array for name, array in open_arrays(store.path).items() if array.ndim >= 2}
         known = {name: place for place, name in enumerate(QUANTITIES)}
         self.names = sorted(found, key=lambda name: (known.get(name, len(known)), name))
         self._arrays = {name: found[name] for name in self.names}
@@ -42,7 +32,7 @@ class DiagramNumbers:
         """An array (states, n_y, n_x)."""
         if name in self._read:
             return self._read[name]
-        with self._reading(name):
+        with reading(self._path, self._grid.tiles):
             values = np.asarray(self._arrays[name][...])
         values = values.reshape(-1, *values.shape[-2:])
         if self._is_finished:
@@ -54,16 +44,14 @@ class DiagramNumbers:
         try:
             return self.whole(name), []
         except StoreError:
-            array, damaged = self._arrays[name], []
-            values = np.full(array.shape, array.fill_value, array.dtype)
+            array = self._arrays[name]
+        damage = damaged_tiles(self._path, array, self._grid.tiles)
+        values = np.full(array.shape, array.fill_value, array.dtype)
         for tile in self._grid.tiles:
-            x, y = self._grid.span(tile)
-            try:
-                with self._reading(f"{name}, tile {tile[0]},{tile[1]}"):
-                    values[..., y, x] = array[..., y, x]
-            except StoreError as error:
-                damaged.append(str(error))
-        return values.reshape(-1, *values.shape[-2:]), damaged
+            if tile not in damage:
+                x, y = self._grid.span(tile)
+                values[..., y, x] = array[..., y, x]
+        return values.reshape(-1, *values.shape[-2:]), [*damage.values()]
 
     def at(self, number: int, i: int, j: int, names: Iterable[str] = ()) -> dict[str, float]:
         """The numbers of a state at values i and j of x and y, all or some by name; what several states share stands for each."""
@@ -79,18 +67,6 @@ class DiagramNumbers:
 
         if missing:
             # In a thread of its own, since a notebook has a loop of events in this one.
-            with self._reading(f"point {i},{j}"), ThreadPoolExecutor(1) as pool:
+            with reading(self._path, self._grid.tiles), ThreadPoolExecutor(1) as pool:
                 known |= zip(missing, map(float, pool.submit(asyncio.run, read()).result()), strict=True)
         return {name: known[name] for name in names}
-
-    @contextmanager
-    def _reading(self, part: str) -> Iterator[None]:
-        """Say in a line what is wrong with a part of the arrays."""
-        with storage(self._path):
-            try:
-                yield
-            except (RuntimeError, ValueError) as error:
-                raise StoreError(
-                    f"{self._path}: numbers in it are damaged ({part}: {error}); restore it, or compute it again with "
-                    "another --out."
-                ) from None

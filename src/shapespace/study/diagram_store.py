@@ -2,33 +2,53 @@
 
     zarr.json, NAME/...   the Zarr store: what `xarray.open_zarr` reads
     anchors/NNNNNN.npz    of each asked state, what it is in the middle of every tile; see `records` for these and the rest
+    shapes/NNNNNN.npz     of each tile, some of its states
 
 The chunks of a tile are written by whoever computes it, each in one step, that of `outcome` last: it marks the tile done.
 """
 
 import json
-import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
-import zarr
 from numpy.typing import NDArray
 
 from shapespace.base.errors import StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.base.scales import QUANTITIES
 from shapespace.study.curve_store import Curve, open_curve
-from shapespace.study.files import storage
-from shapespace.study.frame import Array, read_arrays, write_arrays
-from shapespace.study.grid import Axis, Grid
+from shapespace.study.diagram_arrays import (
+    Variable,
+    are_whole,
+    chunk_file,
+    damaged_chunks,
+    make_arrays,
+    open_arrays,
+    reading,
+    write_chunks,
+)
+from shapespace.study.diagram_request import DiagramRequest
+from shapespace.study.diagram_shapes import (
+    Anchors,
+    Shape,
+    decode_anchors,
+    decode_shapes,
+    encode_anchors,
+    encode_shapes,
+)
+from shapespace.study.files import storage, write_atomically
+from shapespace.study.frame import DAMAGE, Array
+from shapespace.study.grid import Axis, Tile
+from shapespace.study.manifests import holds_store, read_manifest, scenario_of
 from shapespace.study.presenting import Plotted, Summary
-from shapespace.study.records import AbstractRecordStore, holds_store
+from shapespace.study.records import AbstractRecordStore
 from shapespace.study.regimes import Regime
 from shapespace.study.scenario import Scenario
+from shapespace.study.versions import own_version
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -51,8 +71,8 @@ CODES = {outcome: code for code, outcome in enumerate(_OUTCOMES, start=1)}
 """Numbers of outcomes in stores, which stay; 0 is a point that is not computed yet. Names are stored beside them."""
 NOT_COMPUTED = 0
 PHYSICAL_ENDS = [CODES[one] for one in (Outcome.NECK_CLOSED, Outcome.SELF_INTERSECTING)]
-CURVES, BOUNDARIES = "curves", "boundaries.json"
-"""Beside the Zarr store: a folder of curves, and what is known of changes of the map that lie on none."""
+SHAPES, CURVES, BOUNDARIES = "shapes", "curves", "boundaries.json"
+"""Beside the Zarr store: folders of states and of curves, and what is known of changes of the map that lie on none."""
 ABOUT_SOLUTION = {
     "correction": "size of the last Newton correction, relative to the state",
     "iterations": "Newton iterations",
@@ -75,54 +95,6 @@ def kind_codes(outcome: Array, regime: Array, unstable: Array | None = None, but
     return code
 
 
-@dataclass(frozen=True, eq=False)
-class Anchors:
-    """What a state is in the middle of the tiles, tile after tile.
-
-    outcomes (m,): how it was found; meshes, xs: of those that were, else empty. All dimensionless.
-    """
-
-    state: str
-    outcomes: tuple[Outcome, ...]
-    meshes: tuple[Array, ...]
-    xs: tuple[Array, ...]
-
-
-@dataclass(frozen=True)
-class DiagramRequest:
-    """What is asked for besides the scenario.
-
-    states: names. branches: with more than none, up to so many states at each point, on all sheets that folds connect with those
-    named and those of the stores `origins`. adaptive: only at the points of a quad-tree.
-    """
-
-    grid: Grid
-    states: tuple[str, ...]
-    stability: bool
-    branches: int = 0
-    origins: tuple[str, ...] = ()
-    adaptive: bool = False
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """Of the states at one point."""
-        return tuple(f"state-{number + 1}" for number in range(self.branches)) or self.states
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
-        axes = {name: asdict(axis) for name, axis in (("x", self.grid.x), ("y", self.grid.y))}
-        more = {"branches": self.branches, "origins": [*self.origins]} if self.branches else {}
-        more |= {"adaptive": True} if self.adaptive else {}
-        return {**axes, "states": [*self.states], "stability": self.stability, **more}
-
-    @classmethod
-    def from_dict(cls, stored: Mapping[str, Any]) -> Self:
-        """What `as_dict` described."""
-        grid = Grid(Axis(**stored["x"]), Axis(**stored["y"]))
-        more = stored.get("branches", 0), tuple(stored.get("origins", ())), stored.get("adaptive", False)
-        return cls(grid, tuple(stored["states"]), stored["stability"], *more)
-
-
 class DiagramStore(AbstractRecordStore[Anchors]):
     """One diagram. `create` and `resume` give a store to write, `open` one to read, also while it is being written."""
 
@@ -130,56 +102,47 @@ class DiagramStore(AbstractRecordStore[Anchors]):
     folder = "anchors"
     note = "anchors are dimensionless, in units of the scales; observables are in the scenario's units"
 
-    @staticmethod
-    def encode(record: Anchors) -> bytes:
-        """All anchors of one state in a few arrays."""
-        words = json.dumps({"state": record.state, "outcomes": record.outcomes})
-        empty = np.zeros(0)
-        return write_arrays(
-            {
-                "mesh_sizes": np.array([len(one) for one in record.meshes]),
-                "sizes": np.array([len(one) for one in record.xs]),
-                "meshes": np.concatenate([empty, *record.meshes]),
-                "xs": np.concatenate([empty, *record.xs]),
-                "about": np.frombuffer(words.encode(), dtype=np.uint8),
-            }
-        )
-
-    @staticmethod
-    def decode(data: bytes) -> Anchors:
-        """The anchors in the bytes of a file."""
-        stored = read_arrays(data)
-        about = json.loads(stored["about"].tobytes())
-        meshes, xs = (
-            tuple(np.split(stored[name], np.cumsum(stored[sizes])[:-1]))
-            for name, sizes in (("meshes", "mesh_sizes"), ("xs", "sizes"))
-        )
-        return Anchors(about["state"], tuple(Outcome(one) for one in about["outcomes"]), meshes, xs)
+    encode = staticmethod(encode_anchors)
+    decode = staticmethod(decode_anchors)
 
     @classmethod
     def create(cls, path: str | Path, scenario: Scenario, request: DiagramRequest, observables: Sequence[str]) -> Self:
         """A new store, with no point computed, in a directory that is empty or does not exist; StoreError otherwise."""
-        store = cls._create(path, scenario, {cls.noun: request.as_dict()})
-        store.prepare(observables)
-        return store
+        more = {cls.noun: request.as_dict()}
+        return cls._create(path, scenario, more, lambda store: store.make_arrays(observables))
 
     @classmethod
     def resume(cls, path: str | Path, scenario: Scenario, request: DiagramRequest, observables: Sequence[str]) -> Self:
-        """A stored diagram to continue; scenario and request must be the same."""
+        """A stored diagram to continue; scenario, request and the version of this package must be the same.
+
+        What is damaged counts as not computed.
+        """
         path = Path(path)
-        manifest = cls._read_manifest(path)
+        manifest = read_manifest(path, cls.noun, cls.folder)
         stored, wanted = manifest.get(cls.noun), request.as_dict()
-        difference = cls._scenario_of(path, manifest).difference(scenario)
         kept = stored if isinstance(stored, dict) else {}
-        for name in dict.fromkeys((*wanted, *kept)):
-            if kept.get(name) != wanted.get(name):
-                difference = difference or f"{name} is {_short(kept.get(name))}, not {_short(wanted.get(name))}"
-        if difference:
+        differences = [
+            f"{name} is {_short(kept.get(name))}, not {_short(wanted.get(name))}"
+            for name in dict.fromkeys((*wanted, *kept))
+            if kept.get(name) != wanted.get(name)
+        ]
+        if of_scenario := scenario_of(path, cls.noun, manifest).difference(scenario):
+            differences.insert(0, of_scenario)
+        if differences:
             raise StoreError(
-                f"{path}: holds a diagram whose {difference}; resume with the same value or choose another --out."
+                f"{path}: holds a diagram whose {' and '.join(differences)}; resume with the same value or choose another --out."
+            )
+        if (version := manifest["versions"]["shapespace"]) != own_version():
+            raise StoreError(
+                f"{path}: was begun by shapespace {version}, this is {own_version()}; resume with that version or choose "
+                "another --out."
             )
         store = cls._reopen(path, scenario)
-        store.prepare(observables)
+        try:
+            store.mend(observables)
+        except BaseException:
+            store.close()
+            raise
         return store
 
     def _disorder(self, previous: Anchors, record: Anchors) -> str | None:
@@ -190,54 +153,49 @@ class DiagramStore(AbstractRecordStore[Anchors]):
         """What was asked for."""
         return DiagramRequest.from_dict(self.manifest[self.noun])
 
-    def prepare(self, observables: Sequence[str]) -> None:
-        """Make the arrays of the Zarr store, all fill, unless they are there: its description comes last."""
+    def mend(self, observables: Sequence[str]) -> None:
+        """Make arrays that are not there, and take the mark from tiles of which a part is damaged."""
         with storage(self.path):
-            if (self.path / "zarr.json").exists():
-                return
-            root = zarr.open_group(self.path, mode="a", zarr_format=3)
-            grid, states = self.request.grid, self.request.labels
-            names = [*observables, *ABOUT_SOLUTION]
-            for axis in (grid.x, grid.y):
-                coordinate = self._array(root, axis.key, (axis.key,), np.nan, "f8", (axis.count,), (axis.count,))
-                coordinate[:] = axis.values
-            dims: tuple[str, ...]
-            shape: tuple[int, ...]
-            chunks: tuple[int, ...]
-            dims, shape, chunks = grid.keys[::-1], grid.shape[::-1], (grid.y.edge, grid.x.edge)
-            if self.request.branches:
-                self._array(root, COUNT, dims, -1, "i2", shape, chunks)
-            if len(states) > 1:
-                dims, shape, chunks = ("state", *dims), (len(states), *shape), (len(states), *chunks)
-                label = root.create_array(
-                    "state", shape=(len(states),), dtype="str", dimension_names=("state",), overwrite=True
-                )
-                label[:] = np.array(states)
-            for name in names:
-                self._array(root, name, dims, np.nan, "f8", shape, chunks)
-            if self.request.stability:
-                self._array(root, UNSTABLE, dims, np.nan, "f8", shape, chunks)
-            self._array(root, REGIME, dims, 0, "u1", shape, chunks)
-            self._array(root, OUTCOME, dims, NOT_COMPUTED, "i1", shape, chunks)
-            root.attrs.update(self._attributes())
-            with warnings.catch_warnings():
-                # One read instead of one for each array; readers of the plain format pass over it.
-                warnings.simplefilter("ignore", zarr.errors.ZarrUserWarning)
-                zarr.consolidate_metadata(self.path)
+            for leftover in self.path.rglob("*.partial"):
+                leftover.unlink()
+            if not are_whole(self.path):
+                self.make_arrays(observables)
+            outcome = open_arrays(self.path)[OUTCOME]
+            for tile, file in [*damaged_chunks(self.path, self.request.grid.tiles), *self._damaged_shapes()]:
+                chunk_file(self.path, outcome, tile).unlink(missing_ok=True)
+                file.unlink(missing_ok=True)
 
-    def _array(
-        self, root: Any, name: str, dims: tuple[str, ...], fill: float, dtype: str, shape: Any, chunks: Any
-    ) -> Any:
-        return root.create_array(
-            name,
-            shape=shape,
-            chunks=chunks,
-            dtype=dtype,
-            fill_value=fill,
-            dimension_names=dims,
-            attributes=self._about(name),
-            overwrite=True,
-        )
+    def _damaged_shapes(self) -> Iterator[tuple[Tile, Path]]:
+        for tile in self.request.grid.tiles:
+            try:
+                self.read_shapes(tile)
+            except StoreError:
+                yield tile, self._shapes_file(tile)
+
+    def make_arrays(self, observables: Sequence[str]) -> None:
+        """Make the arrays of the Zarr store, with nothing computed."""
+        grid, states = self.request.grid, self.request.labels
+        dims: tuple[str, ...] = grid.keys[::-1]
+        shape: tuple[int, ...] = grid.shape[::-1]
+        chunks: tuple[int, ...] = (grid.y.edge, grid.x.edge)
+        variables = [
+            Variable(
+                axis.key, (axis.key,), (axis.count,), (axis.count,), "f8", np.nan, self._about(axis.key), axis.values
+            )
+            for axis in (grid.x, grid.y)
+        ]
+        if self.request.branches:
+            variables.append(Variable(COUNT, dims, shape, chunks, "i2", -1, self._about(COUNT)))
+        if len(states) > 1:
+            count = len(states)
+            dims, shape, chunks = ("state", *dims), (count, *shape), (count, *chunks)
+            variables.append(Variable("state", ("state",), (count,), (count,), "str", "", {}, np.array(states)))
+        kinds = {UNSTABLE: ("f8", np.nan)} if self.request.stability else {}
+        kinds |= {REGIME: ("u1", 0), OUTCOME: ("i1", NOT_COMPUTED)}
+        for name, (dtype, fill) in {**dict.fromkeys((*observables, *ABOUT_SOLUTION), ("f8", np.nan)), **kinds}.items():
+            variables.append(Variable(name, dims, shape, chunks, dtype, fill, self._about(name)))
+        with storage(self.path):
+            make_arrays(self.path, variables, self._attributes())
 
     def _about(self, name: str) -> dict[str, Any]:
         """Attributes of a variable."""
@@ -270,26 +228,43 @@ class DiagramStore(AbstractRecordStore[Anchors]):
             **{name: manifest[name] for name in ("created", "versions", "scenario", "diagram")},
         }
 
-    def write_tile(self, tile: tuple[int, int], values: Mapping[str, NDArray[Any]]) -> None:
-        """The points of a tile, (states, n_x, n_y) by name; what is not given stays empty."""
+    def write_tile(self, tile: Tile, values: Mapping[str, NDArray[Any]], shapes: Sequence[Shape] = ()) -> None:
+        """The points of a tile, (states, n_x, n_y) by name, and states of it; what is not given stays empty."""
+        # Without the lock: tiles are written by those who compute them, each its own chunks.
         with storage(self.path, "nothing finished is lost: then resume the diagram"):
-            # Without the lock: tiles are written by those who compute them, each its own chunks.
-            root: Any = zarr.open_group(self.path, mode="r+")
-            x, y = self.request.grid.span(tile)
-            where = (..., y, x)
-            for name in [*(set(values) - {OUTCOME}), OUTCOME]:
-                rows = values[name].swapaxes(1, 2)
-                root[name][where] = rows if len(rows) > 1 else rows[0]
+            if shapes:
+                file = self._shapes_file(tile)
+                file.parent.mkdir(exist_ok=True)
+                write_atomically(file, encode_shapes(shapes))
+            rows = {name: array.swapaxes(1, 2) for name, array in values.items()}
+            write_chunks(
+                self.path, tile, {name: one if len(one) > 1 else one[0] for name, one in rows.items()}, OUTCOME
+            )
+
+    def read_shapes(self, tile: Tile) -> tuple[Shape, ...]:
+        """States of a tile that are stored whole, none of one that is not computed. StoreError where they are damaged."""
+        file = self._shapes_file(tile)
+        with storage(file):
+            if not file.exists():
+                return ()
+            data = file.read_bytes()
+        try:
+            return decode_shapes(data)
+        except DAMAGE as error:
+            raise StoreError(f"{file}: is damaged ({error}); resume the diagram to compute it again.") from None
+
+    def _shapes_file(self, tile: Tile) -> Path:
+        return self.path / SHAPES / f"{self.request.grid.number(tile):06d}.npz"
 
     @property
     def outcomes(self) -> NDArray[np.int8]:
         """Codes (states, n_x, n_y) of all points."""
-        root: Any = zarr.open_group(self.path, mode="r")
-        codes = np.asarray(root[OUTCOME][...])
+        with reading(self.path, self.request.grid.tiles):
+            codes = np.asarray(open_arrays(self.path)[OUTCOME][...])
         return codes.reshape(-1, *codes.shape[-2:]).swapaxes(1, 2)
 
     @property
-    def missing_tiles(self) -> list[tuple[int, int]]:
+    def missing_tiles(self) -> list[Tile]:
         """Tiles that are not done, in order."""
         grid, codes = self.request.grid, self.outcomes
         return [tile for tile in grid.tiles if (codes[(0, *grid.span(tile))] == NOT_COMPUTED).any()]
@@ -315,7 +290,9 @@ class Diagram(Plotted):
         # Imported late: it takes half a second to load, and the explorer reads without it.
         import xarray as xr
 
-        return xr.open_zarr(self.store).load()
+        open_arrays(self.store)
+        with reading(self.store, self.request.grid.tiles):
+            return xr.open_zarr(self.store).load()
 
     def summary(self) -> Summary:
         """Axes, how many points have a state, and the map."""

@@ -10,6 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from shapespace.base.errors import InputError
+from shapespace.base.scales import QUANTITIES
 from shapespace.study.frame import Array
 from shapespace.study.keys import MODELS
 from shapespace.study.scenario import Scenario
@@ -19,6 +20,11 @@ LARGEST_EDGE = 25
 WORTH_CUTTING = 10
 """Points along an axis from which on it is cut, so that there is work for several processes."""
 MAX_POINTS = 100_000
+STORED_WHOLE = 1000
+"""States of a map that are stored whole, about, if it is small; of a large one, one or none of a tile."""
+
+Tile = tuple[int, int]
+"""Numbers of a tile along x and y."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,12 @@ class Axis:
         spans = [self.span(number) for number in range(self.tiles)]
         return np.array([(one.start + one.stop) // 2 for one in spans])
 
+    @cached_property
+    def lines(self) -> Array:
+        """The middle and the ends of each tile, where there are several: what one of them has another may have as well."""
+        ends = [*(self.span(number).start for number in range(self.tiles)), self.count - 1]
+        return np.union1d(self.anchors, ends) if self.tiles > 1 else self.anchors
+
     def __str__(self) -> str:
         return f"{self.key}={self.start:g}:{self.stop:g}:{self.count}"
 
@@ -98,21 +110,59 @@ class Grid:
         return self.x.count, self.y.count
 
     @cached_property
-    def tiles(self) -> list[tuple[int, int]]:
+    def tiles(self) -> list[Tile]:
         """All tiles, those of one y after another."""
         return [(i, j) for j, i in product(range(self.y.tiles), range(self.x.tiles))]
+
+    @cached_property
+    def middles(self) -> list[tuple[int, int]]:
+        """The middle points of all tiles."""
+        return [(int(self.x.anchors[i]), int(self.y.anchors[j])) for i, j in self.tiles]
+
+    @cached_property
+    def nodes(self) -> list[tuple[int, int]]:
+        """The middle points of all tiles, then the other points of the lattice of their middles and ends."""
+        lattice = product(self.x.lines.tolist(), self.y.lines.tolist())
+        return list(dict.fromkeys((*self.middles, *lattice)))
+
+    def spread(self, count: int) -> list[tuple[int, int]]:
+        """So many points spread over the map, the first of them for any larger count as well: Halton's sequence."""
+        shares = ((_halton(number, 2), _halton(number, 3)) for number in range(1, count + 1))
+        return [(int(a * self.x.count), int(b * self.y.count)) for a, b in shares]
+
+    def number(self, tile: Tile) -> int:
+        """The place of a tile among all."""
+        return tile[1] * self.x.tiles + tile[0]
 
     def values(self, i: Any, j: Any) -> Array:
         """Values of both keys, (n_i, n_j, 2), for indices or slices along x and y."""
         return np.stack(np.meshgrid(self.x.values[i], self.y.values[j], indexing="ij"), axis=-1)
 
-    def span(self, tile: tuple[int, int]) -> tuple[slice, slice]:
+    def span(self, tile: Tile) -> tuple[slice, slice]:
         """The points of a tile."""
         return self.x.span(tile[0]), self.y.span(tile[1])
 
-    def tile_of(self, at: tuple[int, int]) -> tuple[int, int]:
+    def tile_of(self, at: tuple[int, int]) -> Tile:
         """The tile of a point."""
         return at[0] // self.x.edge, at[1] // self.y.edge
+
+    def chosen(self, tile: Tile, states: int) -> list[tuple[int, int]]:
+        """Points of a tile where states are stored whole: spread evenly over it, edges included, or the middle alone.
+
+        states: at each point.
+        """
+        most = STORED_WHOLE // (states * len(self.tiles))
+        x, y = self.span(tile)
+        lines = min(y.stop - y.start, math.isqrt(most))
+        columns = min(x.stop - x.start, most // max(lines, 1))
+        lines = min(y.stop - y.start, most // max(columns, 1))
+        if min(lines, columns) < 2:
+            return [self.middles[self.number(tile)]]
+        i, j = (
+            np.linspace(one.start, one.stop - 1, count).round().astype(int).tolist()
+            for one, count in ((x, columns), (y, lines))
+        )
+        return [*product(i, j)]
 
     def corners(self, scenario: Scenario) -> list[Scenario]:
         """The scenario at the corners; InputError where the keys or their values are none that it takes."""
@@ -123,7 +173,28 @@ class Grid:
                 raise InputError(f"-{flag} {axis}: must run upwards; give the smaller number first.")
             if not 2 <= axis.count <= MAX_POINTS:
                 raise InputError(f"-{flag} {axis}: must have 2 to {MAX_POINTS} points; choose another count.")
+            _check_parameter(scenario, axis, flag)
         if self.x.key == self.y.key or MODELS[scenario.model].rival_of(self.x.key) == self.y.key:
             raise InputError(f"-y {self.y}: varies the same as -x {self.x}; choose another key for one of them.")
         ends = product((self.x.start, self.x.stop), (self.y.start, self.y.stop))
         return [scenario.with_overrides({self.x.key: x, self.y.key: y}) for x, y in ends]
+
+
+def _check_parameter(scenario: Scenario, axis: Axis, flag: str) -> None:
+    """InputError for what is no parameter of the model but known otherwise."""
+    parameters = [*scenario.parameters.model_dump(), *scenario.twins()]
+    if axis.key in parameters or axis.key not in (*scenario.values(), *QUANTITIES):
+        return
+    what = "belongs to the computation" if axis.key in scenario.values() else "is an observable"
+    raise InputError(
+        f"-{flag} {axis}: {axis.key} {what}, while maps vary parameters of the model; choose one of {', '.join(parameters)}."
+    )
+
+
+def _halton(number: int, base: int) -> float:
+    """The digits of a number in a base mirrored at the point: 1/2, 1/4, 3/4, ... in base 2."""
+    found, unit = 0.0, 1.0 / base
+    while number:
+        number, digit = divmod(number, base)
+        found, unit = found + unit * digit, unit / base
+    return found

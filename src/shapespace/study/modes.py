@@ -17,7 +17,7 @@ from shapespace.study.engine import Engine, even_points, state_of
 from shapespace.study.files import storage, write_atomically
 from shapespace.study.frame import DAMAGE, Frame, read_arrays, write_arrays
 from shapespace.study.scenario import Scenario
-from shapespace.study.starts import find_start
+from shapespace.study.stored_starts import stored_start
 
 MODES_FILE = "modes.npz"
 """In the directory of a state that `steady` stored."""
@@ -118,7 +118,7 @@ def store_modes(path: Path, modes: Modes) -> None:
 
 def find_modes(text: str) -> Modes:
     """The modes of a labelled point of a branch (`STORE:LABEL`), or of a state that `steady` stored (`STORE`)."""
-    start = find_start(text)
+    start = stored_start(text)
     point = start.point
     if point is not None:
         if not len(point.modes):

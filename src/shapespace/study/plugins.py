@@ -3,15 +3,19 @@
 import importlib.util
 import os
 import sys
+from collections.abc import Sequence
 from functools import cache
 from importlib import metadata
 from pathlib import Path
+from tempfile import mkdtemp
+from threading import Lock
 
 from shapespace.base.errors import InputError
 
 GROUP = "shapespace.models"
 VARIABLE = "SHAPESPACE_IMPORT"
 """Of the environment: files that define models, as in PATH; what this process imports, its workers import too."""
+_RECEIVING = Lock()
 
 
 def import_file(path: str | Path) -> None:
@@ -30,14 +34,33 @@ def import_file(path: str | Path) -> None:
     except (SyntaxError, ImportError, ValueError) as error:
         del sys.modules[name]
         raise InputError(f"--import {path}: {' '.join(str(error).split())}") from None
-    files = [file for file in os.environ.get(VARIABLE, "").split(os.pathsep) if file]
-    os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*files, str(path.resolve())]))
+    os.environ[VARIABLE] = os.pathsep.join(dict.fromkeys([*_imported(), str(path.resolve())]))
+
+
+def files_here() -> list[tuple[str, str]]:
+    """Names and texts of the files that were imported, for workers elsewhere."""
+    return [(path.name, path.read_text(encoding="utf-8")) for path in map(Path, _imported())]
+
+
+def receive_files(files: Sequence[tuple[str, str]]) -> None:
+    """Import files that came by name and text, those that this process does not know. InputError as of `import_file`."""
+    with _RECEIVING:
+        known = {text for _, text in files_here()}
+        for name, text in files:
+            if text not in known:
+                path = Path(mkdtemp(prefix="shapespace-")) / name
+                path.write_text(text, encoding="utf-8")
+                import_file(path)
+
+
+def _imported() -> list[str]:
+    return [file for file in os.environ.get(VARIABLE, "").split(os.pathsep) if file]
 
 
 @cache
 def load_installed() -> None:
     """Load the files of the environment and every installed package that registers models, once."""
-    for file in filter(None, os.environ.get(VARIABLE, "").split(os.pathsep)):
+    for file in _imported():
         import_file(file)
     for entry in metadata.entry_points(group=GROUP):
         try:

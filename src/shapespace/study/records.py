@@ -10,40 +10,32 @@ leaves whole files and at most a `*.tmp` that the next writer removes. Each arra
 
 import json
 import os
-import platform
 import re
+import shutil
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from types import TracebackType
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
-from shapespace.base.errors import InputError, StoreError
+from shapespace.base.errors import StoreError
 from shapespace.base.outcome import Outcome
-from shapespace.base.scales import QUANTITIES
 from shapespace.study.files import acquire_lock, storage, sync_directory, write_atomically
 from shapespace.study.frame import DAMAGE
-from shapespace.study.scenario import Scenario
-
-FORMAT_VERSION = 3
-"""To be raised with every change of what is stored, of records too: others are not read."""
-
-CONVENTIONS = (
-    "u = 0 upper pole or apex, u = 1 lower pole or rim; r' = h cos psi, z' = -h sin psi; outward normal "
-    "(sin psi, cos psi); curvatures positive on a sphere, H half their sum; bending energy kappa/2 (2H - C0)^2 with "
-    "kappa = bending_rigidity and C0 = spontaneous_curvature, the same as kappa_H (H - C)^2 with "
-    "kappa_H = mean_curvature_rigidity = 2 kappa and C = spontaneous_mean_curvature = C0/2; "
-    "velocities in the lab frame; at the initial time, whose state is "
-    "given and not solved for, flow, pressure and powers are those of the first step; a flat disc, whose flow has no limit "
-    "there, is at rest"
+from shapespace.study.manifests import (
+    MANIFEST,
+    new_manifest,
+    noun_of,
+    now,
+    read_manifest,
+    scenario_of,
+    write_manifest,
 )
+from shapespace.study.scenario import Scenario
+from shapespace.study.versions import own_versions
 
-_MANIFEST = "store.json"
 _LOCK = "lock"
-_FORMAT = "shapespace-"
 
 R = TypeVar("R")
 
@@ -64,7 +56,7 @@ class AbstractRecordStore(ABC, Generic[R]):
         self._count = count
         self._lock = lock
         self._made: list[Path] = []  # directories that came with the store
-        self._unwritten: dict[str, Any] | None = None  # the manifest of a resumed store, due with its next record
+        self._unwritten: dict[str, Any] | None = None  # the manifest of a resumed store, due before it is written to
 
     @staticmethod
     @abstractmethod
@@ -81,33 +73,44 @@ class AbstractRecordStore(ABC, Generic[R]):
         """What shows that a record does not follow the one before it."""
 
     @classmethod
-    def _create(cls, path: str | Path, scenario: Scenario, more: Mapping[str, Any]) -> Self:
-        """A new store in a directory that is empty or does not exist; StoreError, and nothing written, otherwise."""
+    def _create(
+        cls,
+        path: str | Path,
+        scenario: Scenario,
+        more: Mapping[str, Any],
+        furnish: Callable[[Self], None] = lambda store: None,
+    ) -> Self:
+        """A new store in a directory that is empty or does not exist; StoreError, and nothing written, otherwise.
+
+        furnish: writes what else belongs there from the beginning; killed in it, the store is there to be resumed.
+        """
         path = Path(path)
         with storage(path):
             cls.check_free(path)
             made = [directory for directory in (path, *path.parents) if not directory.exists()]
-        lock = None
+        lock, is_own = None, False
         try:
             with storage(path):
                 path.mkdir(parents=True, exist_ok=True)
                 lock = acquire_lock(path / _LOCK)
                 cls.check_free(path)
+                is_own = True
                 (path / cls.folder).mkdir(exist_ok=True)
-                manifest = cls._new_manifest(scenario) | dict(more)
-                _write_json(path / _MANIFEST, manifest)
+                manifest = new_manifest(cls.noun, cls.folder, cls.note, scenario) | dict(more)
+                write_manifest(path, manifest)
+                store = cls(path, manifest, 0, lock)
+                store._made = made
+                furnish(store)
         except BaseException:
-            cls._undo(path, made, lock)
+            cls._undo(path, made, lock, is_own)
             raise
-        store = cls(path, manifest, 0, lock)
-        store._made = made
         return store
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
         """A store to read. StoreError where it is foreign or damaged, or records are missing."""
         path = Path(path)
-        manifest = cls._read_manifest(path)
+        manifest = read_manifest(path, cls.noun, cls.folder)
         store = cls(path, manifest, cls._count_records(path), None)
         if (manifest[cls.folder] or 0) > len(store):
             missing = store._file(len(store))
@@ -121,17 +124,17 @@ class AbstractRecordStore(ABC, Generic[R]):
     @classmethod
     def open_damaged(cls, path: str | Path) -> Self:
         """A store to look at whatever has become of its records: `read` says which of them are damaged or missing."""
-        manifest, numbers = cls._read_manifest(Path(path)), cls._numbers(Path(path))
+        manifest, numbers = read_manifest(Path(path), cls.noun, cls.folder), cls._numbers(Path(path))
         return cls(Path(path), manifest, max([manifest[cls.folder] or 0, *(one + 1 for one in numbers)]), None)
 
     @classmethod
     def _reopen(cls, path: Path, scenario: Scenario) -> Self:
-        """A store to continue, with every record checked; `scenario` is written with the next record."""
+        """A store to continue, with every record checked; `enter` writes `scenario` and the session."""
         with storage(path):
             lock = acquire_lock(path / _LOCK)
         try:
             # Read only now that no other process is writing.
-            manifest = cls._read_manifest(path)
+            manifest = read_manifest(path, cls.noun, cls.folder)
             with storage(path):
                 for leftover in [*path.glob("*.tmp"), *(path / cls.folder).glob("*.tmp")]:
                     leftover.unlink()
@@ -144,19 +147,24 @@ class AbstractRecordStore(ABC, Generic[R]):
         reopened = {"status": "running", "outcome": None, cls.folder: None}
         if (manifest[cls.folder] or 0) > len(store):
             manifest |= reopened
-        session = {"at": _now(), cls.folder: len(store), "versions": own_versions()}
+        session = {"at": now(), cls.folder: len(store), "versions": own_versions()}
         store._unwritten = manifest | reopened | {"resumed": [*manifest["resumed"], session]}
         return store
 
     def append(self, record: R) -> None:
         """Write the next record. After a StoreError (disk full, not writable) all records before it are intact."""
-        self._check_writable()
+        self.enter()
         with storage(self.path, self._remedy):
-            if self._unwritten is not None:
-                _write_json(self.path / _MANIFEST, self._unwritten)
-                self._manifest, self._unwritten = self._unwritten, None
             write_atomically(self._file(self._count), self.encode(record))
         self._count += 1
+
+    def enter(self) -> None:
+        """Note that a session writes to this store, before it does so."""
+        self._check_writable()
+        if self._unwritten is not None:
+            with storage(self.path, self._remedy):
+                write_manifest(self.path, self._unwritten)
+            self._manifest, self._unwritten = self._unwritten, None
 
     def finish(self, outcome: Outcome) -> None:
         """Note how the computation ended."""
@@ -165,14 +173,13 @@ class AbstractRecordStore(ABC, Generic[R]):
         manifest = manifest | {"status": "finished", "outcome": outcome.value, self.folder: self._count}
         with storage(self.path, self._remedy):
             sync_directory(self.path / self.folder)
-            _write_json(self.path / _MANIFEST, manifest)
+            write_manifest(self.path, manifest)
         self._manifest, self._unwritten = manifest, None
 
     def discard(self) -> None:
         """Take back a store that was made to be written and holds no record, as if it had never been begun."""
         if self._lock is not None and not self._count:
-            (self.path / _MANIFEST).unlink()
-            self._undo(self.path, self._made, self._lock)
+            self._undo(self.path, self._made, self._lock, is_own=True)
             self._lock = None
 
     def read(self, index: int) -> R:
@@ -204,7 +211,7 @@ class AbstractRecordStore(ABC, Generic[R]):
     @property
     def scenario(self) -> Scenario:
         """What was computed; of a resumed run with the new end."""
-        return self._scenario_of(self.path, self._manifest)
+        return scenario_of(self.path, self.noun, self._manifest)
 
     @property
     def outcome(self) -> Outcome | None:
@@ -271,87 +278,29 @@ class AbstractRecordStore(ABC, Generic[R]):
             return
         if not path.is_dir():
             raise StoreError(f"{path}: is not a directory; choose another --out.")
-        names = {entry.name for entry in path.iterdir()} - {_LOCK, f"{_MANIFEST}.tmp"}
+        names = {entry.name for entry in path.iterdir()} - {_LOCK, f"{MANIFEST}.tmp"}
         if names == {cls.folder} and not any((path / cls.folder).iterdir()):
             names = set()
-        if _MANIFEST in names:
+        if MANIFEST in names:
             noun = noun_of(path) or "run"
             raise StoreError(f"{path}: holds a {noun} already; continue it with --resume or choose another --out.")
         if names:
             raise StoreError(f"{path}: holds other files ({min(names)}); choose an empty or a new directory as --out.")
 
     @classmethod
-    def _undo(cls, path: Path, made: list[Path], lock: int | None) -> None:
-        """Take back what a failed creation wrote. Without the lock another process owns the directory: leave it alone."""
+    def _undo(cls, path: Path, made: list[Path], lock: int | None, is_own: bool) -> None:
+        """Take back what a failed creation wrote, in a directory that was found free under the lock."""
         with suppress(OSError):
-            if lock is not None:
-                (path / cls.folder).rmdir()
-        with suppress(OSError):
-            if lock is not None:
-                (path / _LOCK).unlink()
-                os.close(lock)
+            # The manifest last but one: killed before, the store is there to be resumed.
+            last = (MANIFEST, _LOCK)
+            entries = sorted(path.iterdir(), key=lambda one: last.index(one.name) if one.name in last else -1)
+            for entry in entries if is_own else ():
+                shutil.rmtree(entry) if entry.is_dir() else entry.unlink()
+        if lock is not None:
+            os.close(lock)
         with suppress(OSError):
             for directory in made:
                 directory.rmdir()
-
-    @classmethod
-    def _new_manifest(cls, scenario: Scenario) -> dict[str, Any]:
-        scales = scenario.scales
-        return {
-            "format": _FORMAT + cls.noun,
-            "format_version": FORMAT_VERSION,
-            "created": _now(),
-            "versions": own_versions(),
-            "scales": {name: getattr(scales, name) for name in ("length", "energy", "time", "concentration")},
-            "units": {name: scales.unit(name) for name in QUANTITIES},
-            "conventions": CONVENTIONS,
-            "note": cls.note,
-            "scenario": scenario.as_dict(),
-            "status": "running",
-            "outcome": None,
-            cls.folder: None,
-            "resumed": [],
-        }
-
-    @classmethod
-    def _read_manifest(cls, path: Path) -> dict[str, Any]:
-        file, made = path / _MANIFEST, f"`shapespace {cls.noun}` made"
-        with storage(path):
-            if not path.is_dir():
-                raise StoreError(f"{path}: is not a directory that holds a {cls.noun}; give one that {made}.")
-            if not file.exists():
-                raise StoreError(f"{path}: holds no {cls.noun} (no {_MANIFEST}); give a directory that {made}.")
-            data = file.read_bytes()
-        remedy = f"restore it, or {cls.noun} again with another --out."
-        try:
-            manifest = json.loads(data)
-        except (ValueError, RecursionError) as error:
-            raise StoreError(f"{file}: is damaged ({error}); {remedy}") from None
-        if not isinstance(manifest, dict) or manifest.get("format") != _FORMAT + cls.noun:
-            raise StoreError(f"{file}: is not of a {_FORMAT}{cls.noun} store; give a directory that {made}.")
-        if manifest.get("format_version") != FORMAT_VERSION:
-            raise StoreError(
-                f"{file}: was written by another version of shapespace (format_version {manifest.get('format_version')}, this "
-                f"one reads {FORMAT_VERSION}); use that version, or {cls.noun} again with another --out."
-            )
-        missing = {"created", "versions", "scenario", "outcome", cls.folder, "resumed", "status"} - manifest.keys()
-        if missing:
-            raise StoreError(f"{file}: is damaged (no {min(missing)}); {remedy}")
-        if not isinstance(manifest[cls.folder], int | None) or manifest["outcome"] not in {None, *Outcome}:
-            raise StoreError(f"{file}: is damaged (outcome or {cls.folder}); {remedy}")
-        cls._scenario_of(path, manifest)
-        return manifest
-
-    @classmethod
-    def _scenario_of(cls, path: Path, manifest: dict[str, Any]) -> Scenario:
-        try:
-            return Scenario.from_dict(manifest["scenario"])
-        except (InputError, KeyError, TypeError, AttributeError) as error:
-            if "--import" in str(error):
-                raise StoreError(f"{path}: {error}") from None
-            raise StoreError(
-                f"{path / _MANIFEST}: is damaged (scenario: {error}); restore it, or {cls.noun} again with another --out."
-            ) from None
 
     @classmethod
     def _count_records(cls, path: Path) -> int:
@@ -370,41 +319,3 @@ class AbstractRecordStore(ABC, Generic[R]):
         with storage(path):
             names = [entry.name for entry in (path / cls.folder).iterdir()]
         return sorted(int(name[:-4]) for name in names if re.fullmatch(r"\d{6,}\.npz", name))
-
-
-def noun_of(path: str | Path) -> str | None:
-    """What a directory holds by its manifest, `run`, `branch` or `curve`; None where that cannot be told."""
-    try:
-        manifest = json.loads((Path(path) / _MANIFEST).read_bytes())
-    except (OSError, ValueError, RecursionError):
-        return None
-    form = manifest.get("format") if isinstance(manifest, dict) else None
-    return form.removeprefix(_FORMAT) if isinstance(form, str) and form.startswith(_FORMAT) else None
-
-
-def holds_store(path: str | Path) -> bool:
-    """Whether there is a manifest in this directory, whatever its state."""
-    try:
-        return (Path(path) / _MANIFEST).is_file()
-    except OSError:
-        return False
-
-
-def _write_json(path: Path, content: dict[str, Any]) -> None:
-    write_atomically(path, (json.dumps(content, indent=2, allow_nan=False) + "\n").encode())
-    sync_directory(path.parent)
-
-
-def _now() -> str:
-    return datetime.now(UTC).isoformat(timespec="seconds")
-
-
-def own_versions() -> dict[str, str]:
-    """Of Python and of the packages that results depend on."""
-    versions = {"python": platform.python_version()}
-    for package in ("shapespace", "jax", "numpy"):
-        try:
-            versions[package] = metadata.version(package)
-        except metadata.PackageNotFoundError:
-            versions[package] = "not installed"
-    return versions

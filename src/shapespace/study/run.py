@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from shapespace.base.errors import InputError
 from shapespace.base.outcome import Outcome
 from shapespace.study.frame import Frame
+from shapespace.study.manifests import holds_store
 from shapespace.study.presenting import AbstractAnimation, Plotted, Summary, quantities_table, the_presenter
-from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.starts import Start, find_start
 from shapespace.study.store import RunStore, is_free

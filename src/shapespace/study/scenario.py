@@ -160,17 +160,24 @@ class Scenario(Record, Presented):
         return {"name": self.name, "model": self.model, **units, "given": dict(self.given), **sections}
 
     def difference(self, other: "Scenario") -> str | None:
-        """What keeps `other` from being a continuation of this run: one phrase naming the key, or None."""
+        """What keeps `other` from being a continuation of this run: one phrase naming the key, as it was given, or None."""
         if self.model != other.model:
             return f"model is {self.model}, not {other.model}"
         if self.units != other.units:
             return f"units are {_stated(self.units)}, not {_stated(other.units)}"
-        mine, theirs = self.sections(), other.sections()
-        for section in _SECTIONS:
-            for key, value in mine[section].items():
-                if key not in FREE_ON_RESUME and theirs[section][key] != value:
-                    return f"{key} is {value!r}, not {theirs[section][key]!r}"
-        return None
+        sections, theirs = self.sections(), other.sections()
+        differing = [
+            key
+            for section in _SECTIONS
+            for key, value in sections[section].items()
+            if key not in FREE_ON_RESUME and theirs[section][key] != value
+        ]
+        if not differing:
+            return None
+        mine, others = self.values(), other.values()
+        given = (key for key in dict(other.given) if key not in FREE_ON_RESUME and mine[key] != others[key])
+        key = next(given, differing[0])
+        return f"{key} is {mine[key]!r}, not {others[key]!r}"
 
     def sections(self) -> dict[str, dict[str, Any]]:
         return {section: getattr(self, section).model_dump() for section in _SECTIONS}

@@ -14,6 +14,7 @@ import numpy as np
 from shapespace.base.errors import InputError, StoreError
 from shapespace.base.outcome import Outcome
 from shapespace.study.frame import Array, Frame, arrays_of, frame_of_arrays, read_arrays, write_arrays
+from shapespace.study.manifests import read_manifest, scenario_of
 from shapespace.study.presenting import Plotted, Summary, Table
 from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import Scenario
@@ -111,8 +112,8 @@ class SearchStore(AbstractRecordStore[Tried]):
     def resume(cls, path: str | Path, scenario: Scenario, request: Mapping[str, Any]) -> Self:
         """A stored search to continue. Checks every try; scenario and request must be the same."""
         path = Path(path)
-        manifest = cls._read_manifest(path)
-        difference = cls._scenario_of(path, manifest).difference(scenario)
+        manifest = read_manifest(path, cls.noun, cls.folder)
+        difference = scenario_of(path, cls.noun, manifest).difference(scenario)
         if not difference and manifest.get("search") != dict(request):
             difference = f"starts are {manifest.get('search')}, not {dict(request)}"
         if difference:

@@ -16,9 +16,9 @@ from shapespace.numerics.state import State
 from shapespace.study.engine import Engine, frame_of, state_of
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.landmarks import physical_end
+from shapespace.study.manifests import holds_store
 from shapespace.study.named import check_has_isolated_states, reference
 from shapespace.study.paths import NEWTON, own_states
-from shapespace.study.records import holds_store
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import Search, SearchStore, Tried
 from shapespace.study.settling import key_values

@@ -6,6 +6,7 @@ from typing import Self
 from shapespace.base.errors import StoreError
 from shapespace.study.files import storage
 from shapespace.study.frame import Frame, decode_frame, encode_frame
+from shapespace.study.manifests import read_manifest, scenario_of
 from shapespace.study.records import AbstractRecordStore
 from shapespace.study.scenario import FREE_ON_RESUME, Scenario
 
@@ -31,7 +32,7 @@ class RunStore(AbstractRecordStore[Frame]):
     def resume(cls, path: str | Path, scenario: Scenario) -> Self:
         """A stored run to continue. Checks every frame; only `until` and `max_steps` may differ."""
         path = Path(path)
-        stored = cls._scenario_of(path, cls._read_manifest(path))
+        stored = scenario_of(path, cls.noun, read_manifest(path, cls.noun, cls.folder))
         if difference := stored.difference(scenario):
             raise StoreError(
                 f"{path}: holds a run whose {difference}; resume with the same value or choose another --out."

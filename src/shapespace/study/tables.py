@@ -16,10 +16,10 @@ from shapespace.study.curve_store import Curve, open_curve
 from shapespace.study.dataset import open_dataset, profile_of
 from shapespace.study.diagram_store import open_diagram
 from shapespace.study.frame import Frame
-from shapespace.study.records import CONVENTIONS, noun_of
+from shapespace.study.manifests import CONVENTIONS, noun_of
 from shapespace.study.scenario import Scenario
 from shapespace.study.search_store import Search, open_search
-from shapespace.study.starts import Start, find_start
+from shapespace.study.stored_starts import Start, stored_start
 
 STATE, POINT = "state", "point"
 RATES = 6
@@ -43,7 +43,7 @@ def stored_dataset(text: str | Path) -> xr.Dataset:
     if noun == "search":
         return search_dataset(open_search(path))
     if names_state(text):
-        return state_dataset(find_start(text))
+        return state_dataset(stored_start(text))
     return open_dataset(path)
 
 

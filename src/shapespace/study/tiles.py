@@ -12,10 +12,11 @@ from shapespace.analysis.passage import is_symmetric
 from shapespace.analysis.sheets import spread_sheets, states_at
 from shapespace.analysis.stability import Spectrum
 from shapespace.analysis.stationary import Stationary
-from shapespace.analysis.sweeping import SIDES, Index, Sweep
+from shapespace.analysis.sweeping import Index, Sweep
 from shapespace.base.arrays import Array
 from shapespace.base.outcome import Outcome
 from shapespace.base.problem import REST
+from shapespace.study.diagram_shapes import Anchors, Shape
 from shapespace.study.diagram_store import (
     ABOUT_SOLUTION,
     CODES,
@@ -24,19 +25,17 @@ from shapespace.study.diagram_store import (
     OUTCOME,
     REGIME,
     UNSTABLE,
-    Anchors,
     DiagramStore,
     kind_codes,
 )
 from shapespace.study.engine import Engine
+from shapespace.study.grid import Tile
 from shapespace.study.keyed import KeyedProblem
 from shapespace.study.observables import measure, shape_end
 from shapespace.study.quadtree import Lines, QuadTree
 from shapespace.study.regimes import regime_of
 from shapespace.study.scenario import Scenario
 from shapespace.study.spectra import spectrum_at
-
-Tile = tuple[int, int]
 
 
 class Done(NamedTuple):
@@ -55,8 +54,8 @@ def compute_tile(path: str | Path, tile: Tile) -> Done:
     store = DiagramStore.open(path)
     request = store.request
     compute = _all_sheets if request.branches else _adaptively if request.adaptive else _named
-    values = compute(store, tile)
-    store.write_tile(tile, values)
+    values, shapes = compute(store, tile)
+    store.write_tile(tile, values, shapes)
     is_state = values[OUTCOME] == CODES[Outcome.CONVERGED]
     inferred = int((values[OUTCOME] == CODES[Outcome.INFERRED]).sum())
     if request.branches:  # however many states a point has, it counts once
@@ -64,24 +63,51 @@ def compute_tile(path: str | Path, tile: Tile) -> Done:
     return Done(tile, is_state.size, int(is_state.sum()), inferred, perf_counter() - start)
 
 
-def _named(store: DiagramStore, tile: Tile) -> dict[str, Array]:
-    """Arrays (states, n_x, n_y) of a tile's points: each state by its name."""
+Survey = tuple[dict[str, Array], list[Shape]]
+"""Arrays (states, n_x, n_y) of a tile's points by name, and those of its states that are stored whole."""
+
+
+def _named(store: DiagramStore, tile: Tile) -> Survey:
+    """Each state by its name."""
     surveyor = Surveyor(store.scenario, store.request.grid.keys, store.request.stability)
-    surveys = []
+    surveys, sheets = [], []
     for anchors in store:
         sweep = _sweep(store, surveyor, anchors, tile)
         found = {at: [state] for at, state in sweep.found.items()}
-        surveys.append(surveyor.survey(sweep.values.shape[:2], found, sweep.reasons, _untried(store, anchors, tile)))
-    return {name: np.concatenate([one[name] for one in surveys]) for name in surveys[0]}
+        survey, _ = surveyor.survey(sweep.values.shape[:2], found, sweep.reasons, _untried(store, anchors, tile))
+        surveys.append(survey)
+        sheets.append(sweep.found)
+    arrays = {name: np.concatenate([one[name] for one in surveys]) for name in surveys[0]}
+    return arrays, _shapes_of_names(store, tile, sheets)
+
+
+def _shapes_of_names(store: DiagramStore, tile: Tile, sheets: Sequence[Mapping[Index, Stationary]]) -> list[Shape]:
+    """Some of the states of a tile, by name; where a map has so many tiles that their anchors do, none."""
+    grid = store.request.grid
+    chosen, (x, y) = grid.chosen(tile, len(sheets)), grid.span(tile)
+    if len(chosen) == 1:
+        return []
+    return [
+        shape_of(state, number, number, place)
+        for number, found in enumerate(sheets)
+        for place in chosen
+        if (state := found.get((place[0] - x.start, place[1] - y.start))) is not None
+    ]
+
+
+def shape_of(state: Stationary, sheet: int, number: int, place: Index) -> Shape:
+    """A state to store."""
+    assert isinstance(state.problem, KeyedProblem)
+    return Shape(sheet, number, place, state.problem.base.mesh, state.x)
 
 
 def _untried(store: DiagramStore, anchors: Anchors, tile: Tile) -> Outcome:
     """Why there is no state where none was tried."""
-    own = anchors.outcomes[store.request.grid.tiles.index(tile)]
+    own = anchors.outcomes[store.request.grid.number(tile)]
     return own if own is not Outcome.CONVERGED else Outcome.NOT_REACHED
 
 
-def _adaptively(store: DiagramStore, tile: Tile) -> dict[str, Array]:
+def _adaptively(store: DiagramStore, tile: Tile) -> Survey:
     """As `_named`, but only the points of a quad-tree; others are given the kind of those around, as inferred."""
     surveyor = Surveyor(store.scenario, store.request.grid.keys, store.request.stability)
     followers = [_Follower(store, surveyor, anchors, tile) for anchors in store]
@@ -107,7 +133,7 @@ def _adaptively(store: DiagramStore, tile: Tile) -> dict[str, Array]:
         out[OUTCOME][(slice(None), *at)] = CODES[Outcome.INFERRED]
         for name in {REGIME, UNSTABLE} & out.keys():
             out[name][(slice(None), *at)] = out[name][(slice(None), *like)]
-    return out
+    return out, _shapes_of_names(store, tile, [one.found for one in followers])
 
 
 class _Follower:
@@ -115,7 +141,7 @@ class _Follower:
 
     def __init__(self, store: DiagramStore, surveyor: "Surveyor", anchors: Anchors, tile: Tile) -> None:
         self._store, self._surveyor, self._anchors, self._tile = store, surveyor, anchors, tile
-        self._found: dict[Index, Stationary] = {}
+        self.found: dict[Index, Stationary] = {}
         self._reasons: dict[Index, Outcome] = {}
         self._recorded: set[Index] = set()
         self._near: Spectrum | None = None
@@ -126,21 +152,21 @@ class _Follower:
         places = [{int(one): number for number, one in enumerate(line)} for line in lines]
         known = {
             (places[0][i], places[1][j]): state
-            for (i, j), state in self._found.items()
+            for (i, j), state in self.found.items()
             if i in places[0] and j in places[1]
         }
         if known.keys() >= {*wanted}:
             return
         sweep = _sweep(self._store, self._surveyor, self._anchors, self._tile, lines, known, {*wanted})
         for (i, j), state in sweep.found.items():
-            self._found[int(lines[0][i]), int(lines[1][j])] = state
+            self.found[int(lines[0][i]), int(lines[1][j])] = state
         for (i, j), reason in sweep.reasons.items():
             self._reasons[int(lines[0][i]), int(lines[1][j])] = reason
 
     def record(self, out: dict[str, Array], slot: int, points: Iterable[Index]) -> None:
         """Put what is known at points into the arrays."""
         for at in points:
-            state = self._found.get(at)
+            state = self.found.get(at)
             if state is None:
                 out[OUTCOME][(slot, *at)] = CODES[self._reasons.get(at, self._untried)]
             elif at not in self._recorded:
@@ -149,38 +175,52 @@ class _Follower:
                 self._near = self._surveyor.record(out, (slot, *at), state, measured, self._near)
 
 
-def _all_sheets(store: DiagramStore, tile: Tile) -> dict[str, Array]:
-    """Arrays (branches, n_x, n_y) of a tile's points: all states known there, in the order of their bending energy."""
-    surveyor = Surveyor(store.scenario, store.request.grid.keys, store.request.stability)
+def _all_sheets(store: DiagramStore, tile: Tile) -> Survey:
+    """All states known at each point, in the order of their bending energy."""
+    request = store.request
+    surveyor = Surveyor(store.scenario, request.grid.keys, request.stability)
     sheets = _sheets(store, surveyor, tile)
-    shape = tuple(one.stop - one.start for one in store.request.grid.span(tile))
+    x, y = request.grid.span(tile)
+    shape = x.stop - x.start, y.stop - y.start
     found = {at: states for at in np.ndindex(*shape) if (states := states_at(sheets, at))}
     reasons = {at: reason for sheet in sheets for at, reason in sheet.reasons.items()}
-    survey = surveyor.survey(shape, found, reasons, Outcome.NO_STATE, store.request.branches)
+    arrays, ranked = surveyor.survey(shape, found, reasons, Outcome.NO_STATE, request.branches)
     count = np.zeros((1, *shape), np.int16)
     for at, states in found.items():
         count[(0, *at)] = len(states)
-    return survey | {COUNT: count}
+    shapes = []
+    chosen = {(i - x.start, j - y.start) for i, j in request.grid.chosen(tile, request.branches)}
+    for sheet, sweep in enumerate(sheets):
+        # Of each sheet one at least, that nearest to the middle.
+        middle = min(sweep.found, key=lambda at: abs(at[0] - shape[0] // 2) + abs(at[1] - shape[1] // 2), default=None)
+        for at in sorted(({middle} if middle is not None else set()) | (chosen & sweep.found.keys())):
+            rank = next(i for i, state in enumerate(ranked[at]) if state is sweep.found[at])
+            number = rank if rank < request.branches else -1
+            shapes.append(shape_of(sweep.found[at], sheet, number, (at[0] + x.start, at[1] + y.start)))
+    return arrays | {COUNT: count}, shapes
 
 
 def _sheets(store: DiagramStore, surveyor: "Surveyor", tile: Tile) -> list[Sweep]:
-    """All sheets over a tile that its anchors, those of the tiles beside it and folds lead to."""
-    grid = store.request.grid
+    """All sheets over a tile that the states known in it and on its borders, and folds, lead to."""
+    request = store.request
+    grid = request.grid
     x, y = grid.span(tile)
-    values = grid.values(x, y)
+    middle = grid.middles[grid.number(tile)]
 
     def starts() -> Iterator[tuple[Index, Stationary]]:
-        for near in (tile, *((tile[0] + i, tile[1] + j) for i, j in SIDES)):
-            if near not in grid.tiles:
-                continue
-            number = grid.tiles.index(near)
-            i, j = int(grid.x.anchors[near[0]]), int(grid.y.anchors[near[1]])
-            at = min(max(i, x.start), x.stop - 1) - x.start, min(max(j, y.start), y.stop - 1) - y.start
+        near = [
+            (abs(i - middle[0]) + abs(j - middle[1]), number, (i, j))
+            for number, (i, j) in enumerate(request.places)
+            if x.start <= i <= x.stop and y.start <= j <= y.stop
+        ]
+        for _, number, (i, j) in sorted(near):
+            # The first line of the next tile is a step away from this one's last.
+            at = min(i, x.stop - 1) - x.start, min(j, y.stop - 1) - y.start
             for anchors in store:
                 if anchors.outcomes[number] is Outcome.CONVERGED:
                     yield at, surveyor.state(anchors.meshes[number], anchors.xs[number], grid.values(i, j).reshape(2))
 
-    return spread_sheets(values, starts())
+    return spread_sheets(grid.values(x, y), starts())
 
 
 def _sweep(
@@ -218,32 +258,12 @@ def _sweep(
     return sweep
 
 
-def states_again(store: DiagramStore, number: int, at: Index) -> Iterator[Stationary]:
-    """States at a grid point, computed as the diagram was: from the anchor of its tile by a few points, then in the whole tile.
-
-    number: of the state; of a diagram of all states they are all looked for.
-    """
-    grid, is_strict = store.request.grid, store.request.branches > 0
-    surveyor = Surveyor(store.scenario, grid.keys, stability=False)
-    tile = grid.tile_of(at)
-    place = grid.tiles.index(tile)
-    middle = int(grid.x.anchors[tile[0]]), int(grid.y.anchors[tile[1]])
-    for anchors in store if is_strict else [store.read(number)]:
-        if anchors.outcomes[place] is not Outcome.CONVERGED:
-            continue
-        # Mostly a few points on the way are enough.
-        low, high = np.minimum(at, middle), np.maximum(at, middle) + 1
-        sweep = Sweep(grid.values(*(slice(a, b) for a, b in zip(low, high, strict=True))), is_strict)
-        start = middle[0] - int(low[0]), middle[1] - int(low[1])
-        state = surveyor.state(anchors.meshes[place], anchors.xs[place], grid.values(*middle).reshape(2))
-        if sweep.begin(start, state):
-            sweep.spread(start)
-        found = sweep.found.get((at[0] - int(low[0]), at[1] - int(low[1])))
-        if found is not None:
-            yield found
-    x, y = grid.span(tile)
-    sweeps = _sheets(store, surveyor, tile) if is_strict else [_sweep(store, surveyor, store.read(number), tile)]
-    yield from states_at(sweeps, (at[0] - x.start, at[1] - y.start))
+def sheets_again(store: DiagramStore, number: int, tile: Tile) -> list[Sweep]:
+    """The states of a tile, computed again; number: of the state that is wanted where states have names, else all are found."""
+    surveyor = Surveyor(store.scenario, store.request.grid.keys, stability=False)
+    if store.request.branches:
+        return _sheets(store, surveyor, tile)
+    return [_sweep(store, surveyor, store.read(number), tile)]
 
 
 def _around(tile: Tile) -> Iterator[Tile]:
@@ -281,19 +301,21 @@ class Surveyor:
         reasons: Mapping[Index, Outcome],
         untried: Outcome,
         slots: int = 1,
-    ) -> dict[str, Array]:
-        """Arrays (slots, n_x, n_y) by name, states in the order of their bending energy.
+    ) -> tuple[dict[str, Array], dict[Index, list[Stationary]]]:
+        """Arrays (slots, n_x, n_y) by name, and the states in the order of their bending energy, as they are in the arrays.
 
         reasons: why there is none, where one was tried; `untried` where none was.
         """
-        out = self.empty(slots, shape)
+        out, ranked = self.empty(slots, shape), dict[Index, list[Stationary]]()
         near: list[Spectrum | None] = [None] * slots
         for at in np.ndindex(*shape):
             out[OUTCOME][(slice(None), *at)] = CODES[reasons.get(at, untried)]
             states = [(self.measured(state), state) for state in found.get(at, ())]
-            for slot, (measured, state) in enumerate(sorted(states, key=lambda one: one[0]["bending_energy"])[:slots]):
+            states.sort(key=lambda one: one[0]["bending_energy"])
+            ranked[at] = [state for _, state in states]
+            for slot, (measured, state) in enumerate(states[:slots]):
                 near[slot] = self.record(out, (slot, *at), state, measured, near[slot])
-        return out
+        return out, ranked
 
     def empty(self, slots: int, shape: tuple[int, ...]) -> dict[str, Array]:
         """Arrays (slots, n_x, n_y) by name in which nothing is computed."""
@@ -335,6 +357,10 @@ class Surveyor:
         values = self._engine.values | dict(zip(self._engine.system.parameters, p.tolist(), strict=True))
         engine = replace(self._engine, problem=problem, p=p, values=values)
         return measure(engine, state.x, REST)
+
+    def observables(self, state: Stationary) -> dict[str, float]:
+        """In the scenario's units, as they are stored."""
+        return self._in_units(state, self.measured(state))
 
     def _in_units(self, state: Stationary, measured: dict[str, float]) -> dict[str, float]:
         """In the scenario's units."""

@@ -10,7 +10,7 @@ import subprocess
 import sys
 import threading
 from collections import Counter, deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from queue import SimpleQueue
@@ -18,7 +18,8 @@ from types import TracebackType
 from typing import Any, Self
 
 from shapespace.base.errors import StoreError, WorkerError
-from shapespace.study.tiles import Done, Tile, compute_tile
+from shapespace.study.grid import Tile
+from shapespace.study.tiles import Done, compute_tile
 
 MAX_DEATHS = 3
 """Workers that one tile may cost."""
@@ -44,7 +45,9 @@ class Workers:
         """Of the processes that live."""
         return [one.pid for one in self._processes if one.poll() is None]
 
-    def map(self, path: Path, tiles: Sequence[Tile]) -> Iterator[Done]:
+    def map(
+        self, path: Path, tiles: Sequence[Tile], waiting: Callable[[int], None] = lambda count: None
+    ) -> Iterator[Done]:
         """Compute tiles of a stored diagram, in whatever order they are finished.
 
         The tile of a worker that dies is given to another one. StoreError as a worker met it; WorkerError where a tile
@@ -53,12 +56,12 @@ class Workers:
         if min(self._count, len(tiles)) <= 1:
             yield from (compute_tile(path, tile) for tile in tiles)
             return
-        waiting, deaths = deque(tiles), Counter[Tile]()
+        left, deaths = deque(tiles), Counter[Tile]()
         busy: dict[subprocess.Popen[str], Tile] = {}
-        while waiting or busy:
-            while waiting and len(busy) < self._count:
+        while left or busy:
+            while left and len(busy) < self._count:
                 idle = next((one for one in self._processes if one not in busy), None) or self._start()
-                busy[idle] = waiting.popleft()
+                busy[idle] = left.popleft()
                 self._ask(idle, path, busy[idle])
             worker, line = self._answers.get()
             tile = busy.pop(worker, None)
@@ -74,7 +77,7 @@ class Workers:
                     f"{path}: {MAX_DEATHS} processes died over the same points (status {worker.wait()}), perhaps of too "
                     "little memory; nothing finished is lost: resume with fewer --workers."
                 )
-            waiting.appendleft(tile)
+            left.appendleft(tile)
 
     @staticmethod
     def _ask(worker: subprocess.Popen[str], path: Path, tile: Tile) -> None:

@@ -13,8 +13,8 @@ from shapespace.study.branch_store import Branch, open_branch
 from shapespace.study.curve_store import Curve, open_curve
 from shapespace.study.dataset import open_dataset
 from shapespace.study.diagram_store import Diagram, open_diagram
+from shapespace.study.manifests import holds_store, noun_of
 from shapespace.study.modes import find_modes
-from shapespace.study.records import holds_store, noun_of
 from shapespace.study.search_store import Search, Tried, open_search
 from shapespace.study.starts import find_start
 from shapespace.study.tables import branch_dataset, names_state, search_dataset, state_dataset

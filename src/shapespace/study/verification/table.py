@@ -5,10 +5,10 @@ import platform
 from collections.abc import Callable
 from time import perf_counter
 
-from shapespace.study.records import own_versions
 from shapespace.study.verification import buckling, continuation, divisions, membranes, spheres
 from shapespace.study.verification.record import Benchmark, Result, Row, Verification
 from shapespace.study.verification.states import Absent
+from shapespace.study.versions import own_versions
 
 BENCHMARKS = (
     Benchmark("Sphere at rest", spheres.resting),
