@@ -75,4 +75,6 @@ def browser(program: "Browser") -> "Iterator[Browser]":
     program.requests.clear()
     program.resize(1280, 800)
     yield program
+    # A page left open may go on moving, at the cost of all tests after it.
+    program.send("Page.navigate", url="about:blank")
     assert not program.errors

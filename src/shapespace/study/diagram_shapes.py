@@ -29,7 +29,7 @@ class Shape(NamedTuple):
     """A state of a tile. place: of its point in the grid. number: of the state there, -1 where it is none of those stored.
 
     sheet: of states that change into each other from point to point of the tile; of named states that of the name. mesh, x:
-    dimensionless.
+    dimensionless, in single precision where read from a file: a Newton iteration makes up for it.
     """
 
     sheet: int
@@ -56,13 +56,14 @@ def decode_anchors(data: bytes) -> Anchors:
 def encode_shapes(shapes: Sequence[Shape]) -> bytes:
     """The bytes of a file."""
     places = np.array([(one.sheet, one.number, *one.place) for one in shapes], np.int64).reshape(-1, 4)
-    return write_arrays({**_joined([one.mesh for one in shapes], [one.x for one in shapes]), "places": places})
+    joined = _joined([one.mesh for one in shapes], [one.x for one in shapes])
+    return write_arrays({**joined, "xs": joined["xs"].astype(np.float32), "places": places})
 
 
 def decode_shapes(data: bytes) -> tuple[Shape, ...]:
     """The states in the bytes of a file; one of `frame.DAMAGE` where they are not what was written."""
     stored = read_arrays(data)
-    meshes, xs = _split(stored)
+    meshes, xs = _split({**stored, "xs": stored["xs"].astype(np.float64)})
     places = stored["places"].tolist()
     return tuple(
         Shape(sheet, number, (i, j), mesh, x) for (sheet, number, i, j), mesh, x in zip(places, meshes, xs, strict=True)

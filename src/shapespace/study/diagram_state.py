@@ -175,7 +175,9 @@ class DiagramStates:
     def _stepped(self, start: Stationary, place: Place) -> Stationary | None:
         """By a few long steps from a known state; None where they lead elsewhere."""
         goal = self._grid.values(*place[1:]).reshape(2)
-        return step_to(start, goal, SWEEP_NEWTON, SHORTEST) if not np.array_equal(start.p, goal) else start
+        if np.array_equal(start.p, goal):
+            return solve_stationary(start.problem, start.x, goal, SWEEP_NEWTON)
+        return step_to(start, goal, SWEEP_NEWTON, SHORTEST)
 
     def _swept_again(self, place: Place) -> list[Sweep]:
         """The whole tile, computed as it was; that of the last time is kept, for the points beside."""

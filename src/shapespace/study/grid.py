@@ -20,8 +20,8 @@ LARGEST_EDGE = 25
 WORTH_CUTTING = 10
 """Points along an axis from which on it is cut, so that there is work for several processes."""
 MAX_POINTS = 100_000
-STORED_WHOLE = 1000
-"""States of a map that are stored whole, about, if it is small; of a large one, one or none of a tile."""
+STORED_WHOLE = 10_000
+"""States of a map that are stored whole at most, 80 MB: close enough for the others to be one or two Newton iterations away."""
 
 Tile = tuple[int, int]
 """Numbers of a tile along x and y."""

@@ -16,7 +16,7 @@ from shapespace.study.diagram_store import Diagram, open_diagram
 from shapespace.study.manifests import holds_store, noun_of
 from shapespace.study.modes import find_modes
 from shapespace.study.search_store import Search, Tried, open_search
-from shapespace.study.starts import find_start
+from shapespace.study.stored_starts import stored_start
 from shapespace.study.tables import branch_dataset, names_state, search_dataset, state_dataset
 from shapespace.view import style
 from shapespace.view.branch import plot_branch
@@ -118,7 +118,7 @@ def _told(state: Tried) -> str:
 
 def _point_figure(text: str) -> Figure:
     """Of the state that `STORE:LABEL` names, titled by its label and its values of the keys that vary."""
-    start = find_start(text)
+    start = stored_start(text)
     values = start.scenario.values()
     told = [style.quantity_value(start.scenario.scales, key, float(values[key]), ".6g") for key in start.keys]
     return plot_states(state_dataset(start), [", ".join([Path(text).name, *told])])
