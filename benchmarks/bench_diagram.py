@@ -51,7 +51,7 @@ from shapespace.study.tiles import Done, compute_tile, observable_names
 PECLET, LENGTH = (25.0, 300.0), (0.1, 10.0)
 SAMPLE = 20
 """Points of the loop and of the peer's row."""
-TILES = 4
+TILES = 16
 """That stand for a large map."""
 TASKS = 2000
 BATCHES = (1, 8, 32)
@@ -74,9 +74,13 @@ def prepared(case: Scenario, count: int, folder: Path) -> Iterator[DiagramStore]
 
 
 def sampled(store: DiagramStore, most: int | None = None) -> tuple[list[Done], float]:
-    """Tiles from all over a map, and the processor time that they took."""
-    tiles = store.request.grid.tiles
-    tiles = tiles[:: max(1, len(tiles) // most)][:most] if most else tiles
+    """Tiles from all over a map, all where it has no more than `most`, and the processor time that they took."""
+    grid = store.request.grid
+    tiles = grid.tiles
+    if most and most < len(tiles):
+        # One of every so many would all lie at the same Peclet number.
+        spread = dict.fromkeys(grid.tile_of(at) for at in grid.spread(8 * most))
+        tiles = [*spread][:most]
     compute_tile(store.path, tiles[0])
     start = time.process_time()
     done = [compute_tile(store.path, tile) for tile in tiles]
