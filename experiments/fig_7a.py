@@ -42,7 +42,7 @@ from shapespace.study.boundaries import distances, find_changes
 from shapespace.study.curve_store import Curve, outline
 from shapespace.study.regimes import SHAPE, Regime, describe
 from shapespace.view import style
-from shapespace.view.curve import draw_curve
+from shapespace.view.curve import MARKS, draw_curve
 from shapespace.view.diagram import draw_regimes
 
 RING, PECLET, NECK = "ring_amplitude", "peclet", "equator_radius"
@@ -73,6 +73,8 @@ CHECKS = (
 SAME = 1e-3
 """Neck radii of one and the same surface differ by less."""
 KICK = 1e-3
+POINTS = {"fold-pitchfork": "pitchfork meets fold", "cusp": "two folds meet", "turn": "fold turns"}
+"""Special points of the curves that the legend names."""
 BEYOND = "not in the paper"
 
 
@@ -277,7 +279,13 @@ def draw(
         handles, names = left.get_legend_handles_labels()
         marks = (("x", "dynamics: one attractor"), ("o", "dynamics: two attractors"))
         handles += [Line2D([], [], color=style.INK, linestyle="", marker=mark, ms=4.0, mfc="none") for mark, _ in marks]
-        figure.legend(handles, [*names, *(text for _, text in marks)], ncols=4, loc="outside lower center")
+        names += [text for _, text in marks]
+        kinds = {point.kind for curve in curves.values() for point in curve.special_points}
+        for kind, text in POINTS.items():
+            if kind in kinds:
+                handles.append(Line2D([], [], color=style.RED, linestyle="", marker=MARKS[kind], ms=4.0))
+                names.append(text)
+        figure.legend(handles, names, ncols=4, loc="outside lower center")
         save(figure, out, "fig_7a")
 
 
