@@ -7,7 +7,7 @@ polarity P = 1 - H(0)/H(1) of its shape (b) (Sec. V B 1 of the paper). Shapes ar
 Parameters: Table 5 with k = 9, c_s = c0 (Fig. 5). The ranges of the grid are not named in the text: Pe = 25 to 300,
 R0/L_h = 0.1 to 10 are ours; 500 x 500 points as in the paper. Units: R0, kappa, tau = eta_b R0^2/kappa.
 
-Run:   python experiments/fig_5abcd.py [--quick] [--out DIR]        Time: 12 min on two cores, --quick 1 min.
+Run:   python experiments/fig_5abcd.py [--quick] [--out DIR]        Time: 3 to 12 min on two cores, --quick 1 min.
 
 Expect: every point converges to 1e-8; where screening is strong (R0/L_h >> 1) speed and polarity rise with Pe; at Pe =
 300 the polarity rises with R0/L_h and saturates, while the speed hardly changes. Along R0/L_h = 5 and Pe = 300 the map

@@ -10,7 +10,7 @@ surface, circles those where they do not.
 Parameters: Table 5, k = 45, R0/L_h = 0.3, c_s = 10, w^2 = 0.02. The paper considers Pe < 500; the ranges Delta_c = 0 to 8,
 Pe = 60 to 500 are ours. Units: R0, kappa, tau = eta_b R0^2/kappa, c0.
 
-Run:   python experiments/fig_7a.py [--quick] [--out DIR]        Time: 10 min on two cores, --quick 30 s on one.
+Run:   python experiments/fig_7a.py [--quick] [--out DIR]        Time: 3 to 10 min on two cores, --quick 30 s on one.
 
 Expect: at Pe = 450 folds at Delta_c = 2.36247419 and 1.29348538, which AUTO-07p finds as well; three states at every
 point between the two curves and one elsewhere. Well before its fold the ellipsoid has a slight waist, so that in a part of

@@ -9,7 +9,7 @@ leading mode added: crosses, blue where it returns and red where it leaves.
 Parameters: Table 5, Pe = 450, Delta_c = 4, c_s = 10. The ranges k = 10 to 50, R0/L_h = 0.3 to 6 are ours. Units: R0,
 kappa, tau = eta_b R0^2/kappa.
 
-Run:   python experiments/fig_7c.py [--quick] [--out DIR]        Time: 15 min on one core, --quick 30 s.
+Run:   python experiments/fig_7c.py [--quick] [--out DIR]        Time: 8 to 15 min on one core, --quick 30 s.
 
 Expect: the surface is stable for k above a threshold, which is 37.594 at R0/L_h = 0.3 (Fig. 7d), and falls with R0/L_h
 first; the boundary is not monotonic, and around R0/L_h = 4.6 a finger of instability reaches to k = 30.05, so
@@ -20,12 +20,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 import shapespace as ss
 from common import Row, main, near, panels, save
 from shapespace.study.boundaries import distances, find_changes
 from shapespace.study.curve_store import Curve, outline
 from shapespace.view import style
+from shapespace.view.curve import MARKS
 from shapespace.view.diagram import draw_boundaries, draw_regimes
 
 TURNOVER, LENGTH = "turnover_rate", "inverse_hydrodynamic_length"
@@ -37,6 +39,8 @@ CHECKS = ((45.0, 0.3), (34.0, 0.3), (28.0, 3.5), (28.0, 4.6), (28.0, 5.1), (20.0
 """k and R0/L_h of the dynamic checks; the fourth is in the finger."""
 KICK, SWIMS = 1e-2, 1e-2
 """Of the leading mode, and the speed from which on a surface has left the symmetric one."""
+TURNING = "degenerate-pitchfork"
+"""Special points where the pitchfork turns from super- to subcritical."""
 
 
 def run(out: Path, quick: bool) -> list[Row]:
@@ -135,6 +139,8 @@ def draw(found: ss.Diagram, seen: dict[tuple[float, float], float], out: Path) -
         axes.set_ylabel(style.quantity_label(found.scenario.scales, LENGTH))
         handles, names = axes.get_legend_handles_labels()
         once = dict(zip(names, handles, strict=True))
+        if any(point.kind == TURNING for curve in found.boundaries for point in curve.special_points):
+            once["turns subcritical"] = Line2D([], [], color=style.RED, linestyle="", marker=MARKS[TURNING], ms=4.0)
         figure.legend(once.values(), once.keys(), loc="outside right upper")
         save(figure, out, "fig_7c")
 
