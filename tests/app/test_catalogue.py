@@ -137,7 +137,7 @@ def test_numbers_of_a_map_are_at_hand_once_it_is_warm(stores: Stores, monkeypatc
     catalogue = Catalogue([stores.map])
     before = ask(catalogue, "state", store=0, place="0,3,4")
     catalogue.source(0).warm()
-    monkeypatch.setattr("shapespace.study.diagram_numbers.DiagramNumbers._reading", None)
+    monkeypatch.setattr("shapespace.study.diagram_numbers.reading", None)
     assert ask(catalogue, "state", store=0, place="0,3,4") == before
 
 
@@ -152,7 +152,7 @@ def test_a_map_with_damaged_parts_is_told_without_them(more: MoreStores, tmp_pat
     assert whole["damage"] == []
     assert len(found["damage"]) == 2
     assert any(str(files[0]) in one for one in found["damage"])
-    assert any("outcome, tile 0,0" in one for one in found["damage"])
+    assert any(f"{files[1]}: numbers of tile 0, 0" in one for one in found["damage"])
     assert [one["of"] for one in found["map"]["boundaries"]] == [one["of"] for one in whole["map"]["boundaries"]]
     assert not array(found["map"]["outcomes"]).any()
 
